@@ -1,0 +1,6 @@
+#include <cstdio>
+
+int main() {
+  std::puts("scarp " SCARP_VERSION);
+  return 0;
+}
