@@ -10,15 +10,23 @@ using Wide = __int128;
 
 std::atomic<unsigned long> exact_count{0};
 
-int sign(double value) { return (value > 0) - (value < 0); }
-int sign(Wide value) { return (value > 0) - (value < 0); }
+int sign(double value) {
+  return (value > 0) - (value < 0);
+}
+int sign(Wide value) {
+  return (value > 0) - (value < 0);
+}
 
 /// Difference of two lattice coordinates in steps: at most 2^40, exact.
-Wide steps(double to_m, double from_m) { return Wide{lattice_steps(to_m) - lattice_steps(from_m)}; }
+Wide steps(double to_m, double from_m) {
+  return Wide{lattice_steps(to_m) - lattice_steps(from_m)};
+}
 
 }  // namespace
 
-unsigned long exact_predicate_count() { return exact_count.load(std::memory_order_relaxed); }
+unsigned long exact_predicate_count() {
+  return exact_count.load(std::memory_order_relaxed);
+}
 
 int orient2d(const Position& a, const Position& b, const Position& c) {
   // Differences are exact (40 bits). Each product and the subtraction round once, so the error

@@ -30,9 +30,9 @@ struct RegionView {
 /// The regions of all nodes in all sectors, in one flat array each.
 struct Regions {
   SectorLayout layout;
-  std::vector<std::uint32_t> first;   ///< [nodes * sectors + 1] into points
+  std::vector<std::uint32_t> first;  ///< [nodes * sectors + 1] into points
   std::vector<RegionPoint> points;
-  std::vector<double> end_slope;      ///< [nodes * sectors]
+  std::vector<double> end_slope;  ///< [nodes * sectors]
 
   RegionView at(GroupIndex node, std::int32_t sector) const {
     const std::size_t i = static_cast<std::size_t>(node) * static_cast<std::size_t>(layout.count) +

@@ -15,8 +15,8 @@ namespace scarp {
 struct SampleGrid {
   std::int32_t columns = 0;
   std::int32_t rows = 0;
-  std::vector<Position> positions;    ///< [rows * columns], row by row
-  std::vector<std::uint8_t> known;    ///< [rows * columns], 0 where the sample is void
+  std::vector<Position> positions;  ///< [rows * columns], row by row
+  std::vector<std::uint8_t> known;  ///< [rows * columns], 0 where the sample is void
   /// Cell size at the scene's centre, metres, both positive. Nominal: positions decide.
   double cell_x_m = 0;
   double cell_y_m = 0;

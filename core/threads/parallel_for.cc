@@ -28,7 +28,9 @@ int available_threads() {
 
 }  // namespace
 
-void set_thread_count(int threads) { asked_threads = threads; }
+void set_thread_count(int threads) {
+  asked_threads = threads;
+}
 
 int thread_count() {
   const int asked = asked_threads;
@@ -65,9 +67,7 @@ void parallel_for(std::size_t count, const std::function<void(std::size_t)>& bod
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                   static_cast<std::size_t>(thread_count()));
   tbb::task_arena arena(thread_count());
-  arena.execute([&] {
-    tbb::parallel_for(std::size_t{0}, count, body, tbb::simple_partitioner());
-  });
+  arena.execute([&] { tbb::parallel_for(std::size_t{0}, count, body, tbb::simple_partitioner()); });
 }
 
 #endif

@@ -40,14 +40,16 @@ TEST(Flattening, StraightLinesStayStraightWithoutRefraction) {
   std::uniform_real_distribution<double> angle(-0.03, 0.03), height(0, 4000), part(0, 1);
   const Flattening frame(on_sphere(0.2, 0.8, kEarthRadiusM), 0);
   for (int i = 0; i < 1000; ++i) {
-    const EcefPoint a = on_sphere(0.2 + angle(random), 0.8 + angle(random), kEarthRadiusM + height(random));
-    const EcefPoint b = on_sphere(0.2 + angle(random), 0.8 + angle(random), kEarthRadiusM + height(random));
+    const EcefPoint a =
+        on_sphere(0.2 + angle(random), 0.8 + angle(random), kEarthRadiusM + height(random));
+    const EcefPoint b =
+        on_sphere(0.2 + angle(random), 0.8 + angle(random), kEarthRadiusM + height(random));
     const double s = part(random);
     const EcefPoint c{a.x_m + s * (b.x_m - a.x_m), a.y_m + s * (b.y_m - a.y_m),
                       a.z_m + s * (b.z_m - a.z_m)};
     const Position fa = frame.flatten(a), fb = frame.flatten(b), fc = frame.flatten(c);
-    const double t = std::hypot(fc.x_m - fa.x_m, fc.y_m - fa.y_m) /
-                     std::hypot(fb.x_m - fa.x_m, fb.y_m - fa.y_m);
+    const double t =
+        std::hypot(fc.x_m - fa.x_m, fc.y_m - fa.y_m) / std::hypot(fb.x_m - fa.x_m, fb.y_m - fa.y_m);
     ASSERT_NEAR(fc.x_m, fa.x_m + t * (fb.x_m - fa.x_m), 1e-6);
     ASSERT_NEAR(fc.y_m, fa.y_m + t * (fb.y_m - fa.y_m), 1e-6);
     ASSERT_NEAR(fc.z_m, fa.z_m + t * (fb.z_m - fa.z_m), 1e-6);

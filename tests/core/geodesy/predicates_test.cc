@@ -11,8 +11,12 @@ namespace {
 
 using Exact = boost::multiprecision::int512_t;
 
-int sign(const Exact& value) { return value > 0 ? 1 : value < 0 ? -1 : 0; }
-Exact steps(double to, double from) { return Exact(lattice_steps(to)) - Exact(lattice_steps(from)); }
+int sign(const Exact& value) {
+  return value > 0 ? 1 : value < 0 ? -1 : 0;
+}
+Exact steps(double to, double from) {
+  return Exact(lattice_steps(to)) - Exact(lattice_steps(from));
+}
 
 int orient2d_judge(const Position& a, const Position& b, const Position& c) {
   return sign(steps(b.x_m, a.x_m) * steps(c.y_m, a.y_m) -
@@ -30,7 +34,8 @@ int orient3d_judge(const Position& a, const Position& b, const Position& c, cons
 Position random_position(std::mt19937_64& random) {
   const int bits = static_cast<int>(random() % 40);
   const auto coordinate = [&] {
-    const auto steps = static_cast<std::int64_t>(random() >> (63 - bits)) - (std::int64_t{1} << bits);
+    const auto steps =
+        static_cast<std::int64_t>(random() >> (63 - bits)) - (std::int64_t{1} << bits);
     return static_cast<double>(steps) * kLatticeStepM;
   };
   return {coordinate(), coordinate(), coordinate()};
@@ -55,9 +60,10 @@ TEST(Predicates, NearlyFlatNeedsTheExactPathAndGetsItRight) {
     // d = a + s (b - a) + t (c - a), rounded: on the plane, or a fraction of a step off it.
     const double s = static_cast<double>(random() >> 11) * 0x1p-54;
     const double t = static_cast<double>(random() >> 11) * 0x1p-54;
-    const Position d = round_to_lattice(Position{a.x_m + s * (b.x_m - a.x_m) + t * (c.x_m - a.x_m),
-                                                 a.y_m + s * (b.y_m - a.y_m) + t * (c.y_m - a.y_m),
-                                                 a.z_m + s * (b.z_m - a.z_m) + t * (c.z_m - a.z_m)});
+    const Position d =
+        round_to_lattice(Position{a.x_m + s * (b.x_m - a.x_m) + t * (c.x_m - a.x_m),
+                                  a.y_m + s * (b.y_m - a.y_m) + t * (c.y_m - a.y_m),
+                                  a.z_m + s * (b.z_m - a.z_m) + t * (c.z_m - a.z_m)});
     ASSERT_EQ(orient3d(a, b, c, d), orient3d_judge(a, b, c, d));
     ASSERT_EQ(orient2d(a, b, d), orient2d_judge(a, b, d));
   }
@@ -66,7 +72,7 @@ TEST(Predicates, NearlyFlatNeedsTheExactPathAndGetsItRight) {
 
 TEST(Predicates, ExtremesOfTheLatticeDoNotOverflow) {
   const double r = kLatticeReachM;
-  const Position corners[] = {{-r, -r, -r}, {r, -r, r},  {r, r, -r}, {-r, r, r},
+  const Position corners[] = {{-r, -r, -r}, {r, -r, r},  {r, r, -r},  {-r, r, r},
                               {r, r, r},    {-r, -r, r}, {-r, r, -r}, {r, -r, -r}};
   for (const Position& a : corners)
     for (const Position& b : corners)
