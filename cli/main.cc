@@ -1,6 +1,5 @@
-#include <cstdio>
+#include "cli/commands.h"
 
-int main() {
-  std::puts("scarp " SCARP_VERSION);
-  return 0;
+int main(int argc, char** argv) {
+  return scarp::run_command_line(argc, argv);
 }

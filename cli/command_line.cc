@@ -1,0 +1,201 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <new>
+
+#include "cli/commands.h"
+#include "cli/stage_clock.h"
+#include "core/error/error.h"
+#include "core/threads/parallel_for.h"
+
+namespace scarp {
+namespace {
+
+/// Lets an option be typed as X,Y[,H]; CLI11 would split it at commas otherwise.
+std::function<void(const std::string&)> position_into(std::optional<TypedPosition>& position) {
+  return [&position](const std::string& text) { position = parse_position(text); };
+}
+
+void add_common(CLI::App& command, CommonOptions& common) {
+  command.add_flag("--json", common.json, "Print the result as JSON");
+  command.add_option("--threads", common.threads, "Threads to use; all processors unless given")
+      ->check(CLI::Range(1, 4096));
+  command.add_option_function<std::string>(
+      "--memory",
+      [&common](const std::string& text) { common.memory_budget_bytes = parse_bytes(text); },
+      "Memory budget, such as 2GiB; half of the machine's unless given");
+  command.add_flag("--overwrite", common.overwrite, "Replace an output that exists");
+}
+
+void add_surface(CLI::App& command, DemOptions& dem) {
+  command
+      .add_option_function<std::string>(
+          "--earth",
+          [&dem](const std::string& text) {
+            dem.earth = text == "flat" ? Earth::kFlat : Earth::kEllipsoid;
+          },
+          "ellipsoid or flat; ellipsoid where the DEM has a CRS")
+      ->check(CLI::IsMember({"ellipsoid", "flat"}));
+  command.add_option("--refraction", dem.refraction,
+                     "Refraction coefficient, 0 to 1: 0.13 light, 0.25 radio; 0 unless given");
+  command.add_option("--geoid", dem.geoid_file,
+                     "Raster of geoid undulations to add; without it heights are taken as "
+                     "ellipsoidal");
+  command.add_option("--height-unit", dem.height_unit, "m, ft or us-ft, over what the DEM says");
+  command.add_option("--nodata", dem.nodata, "A value that stands for void, besides the DEM's own");
+}
+
+void add_build(CLI::App& app, BuildOptions& o, std::function<int()>& run) {
+  CLI::App* c = app.add_subcommand("build", "Build a scene from one DEM or several");
+  c->footer(
+      "Example:\n  scarp build alps.tif -o alps.scene --max-error 5\n"
+      "Several DEMs that share their cells make one mosaic; later ones lie on top.");
+  c->add_option("dem", o.dem_files, "Any rasters that GDAL reads")->required();
+  c->add_option("-o,--output", o.scene, "The scene, a new folder")->required();
+  auto* error = c->add_option("--max-error", o.max_error_m,
+                              "Greatest height error of the mesh over its whole surface, metres; "
+                              "a tenth of the cell size unless given");
+  c->add_option("--vertices", o.vertices, "Mesh to this many vertices instead")
+      ->excludes(error)
+      ->check(CLI::Range(4U, 400'000'000U));
+  c->add_option("--footprints", o.footprints_file, "Building polygons, any source that OGR reads");
+  c->add_option("--height-field", o.footprints_height_field,
+                "Field of --footprints with heights above ground, metres; height unless given");
+  c->add_option("--sectors", o.sectors, "Directions that horizons are kept for; 16 unless given")
+      ->check(CLI::Range(4, 1024));
+  c->add_option("--subsectors", o.subsectors,
+                "Parts of a sector, the lowest counts; 4 unless given")
+      ->check(CLI::Range(1, 64));
+  c->add_option("--group-triangles", o.group_triangles,
+                "Mean triangles of a group that is aimed at; 128 unless given")
+      ->check(CLI::Range(2, 1'000'000));
+  c->add_option("--min-group-triangles", o.min_group_triangles,
+                "Groups below this are merged or set free; 30 unless given");
+  c->add_option("--seeds", o.seeds, "Crystals sown in the first pass, over --group-triangles");
+  c->add_option("--max-groups", o.max_groups, "No more groups than this; 0: no limit");
+  c->add_option("--seed", o.seed, "Where the sowing begins; the same seed repeats a run exactly");
+  c->add_option_function<std::string>("--observer", position_into(o.observer),
+                                      "Eye of layers/viewshed.tif, X,Y[,H]; 2 m above the highest "
+                                      "sample unless given");
+  c->add_option("--crs", o.crs, "CRS of --observer, such as OGC:CRS84; the DEM's unless given");
+  add_surface(*c, o.dem);
+  add_common(*c, o.common);
+  c->callback([&] { run = [&o] { return run_build(o); }; });
+}
+
+void add_cull(CLI::App& app, CullOptions& o, std::function<int()>& run) {
+  CLI::App* c = app.add_subcommand("cull", "Which groups a camera can see");
+  c->footer("Example:\n  scarp cull alps.scene --camera 8.65,46.55,50 --crs OGC:CRS84 --json");
+  c->add_option("scene", o.scene, "A scene")->required();
+  c->add_option_function<std::string>(
+       "--camera", [&o](const std::string& text) { o.camera = parse_position(text); },
+       "X,Y[,H]: H metres above ground, or as 1200asl")
+      ->required();
+  c->add_option("--crs", o.crs, "CRS of --camera, such as OGC:CRS84; the scene's unless given");
+  auto* azimuth = c->add_option("--azimuth", o.azimuth_deg,
+                                "Direction of view, degrees clockwise from true north (from grid "
+                                "north without a CRS); all around unless given");
+  c->add_option("--field-of-view", o.field_of_view_deg, "Degrees; 90 unless given")
+      ->needs(azimuth)
+      ->check(CLI::Range(0.1, 179.0));
+  add_common(*c, o.common);
+  c->callback([&] { run = [&o] { return run_cull(o); }; });
+}
+
+void add_verify(CLI::App& app, VerifyOptions& o, std::function<int()>& run) {
+  CLI::App* c = app.add_subcommand("verify", "Judge the groups of a scene from random eyes");
+  c->footer("Example:\n  scarp verify alps.scene --eyes 8 --heights 2,50,300,1000");
+  c->add_option("scene", o.scene, "A scene")->required();
+  c->add_option("--eyes", o.eyes, "Random eyes for each height; 8 unless given")
+      ->check(CLI::Range(1, 1'000'000));
+  c->add_option("--heights", o.heights_m, "Metres above ground; 2,50,300,1000 unless given")
+      ->delimiter(',');
+  c->add_option("--seed", o.seed, "Where the random eyes begin; 1 unless given");
+  add_common(*c, o.common);
+  c->callback([&] { run = [&o] { return run_verify(o); }; });
+}
+
+void add_preview(CLI::App& app, PreviewOptions& o, std::function<int()>& run) {
+  CLI::App* c = app.add_subcommand("preview", "Draw a scene as a picture");
+  c->footer(
+      "Examples:\n  scarp preview alps.scene -o alps.png\n"
+      "  scarp preview alps.scene -o seen.png --observer 8.65,46.55,300 --crs OGC:CRS84");
+  c->add_option("scene", o.scene, "A scene")->required();
+  c->add_option("-o,--output", o.output, "The picture, PNG")->required();
+  auto* three_d = c->add_flag("--3d", o.three_d, "In perspective, from a camera that sees it all");
+  auto* camera = c->add_option_function<std::string>("--camera", position_into(o.camera),
+                                                     "In perspective, from X,Y[,H]")
+                     ->excludes(three_d);
+  c->add_option_function<std::string>("--target", position_into(o.target),
+                                      "What the camera looks at, X,Y[,H]; the middle unless given")
+      ->needs(camera);
+  c->add_option_function<std::string>("--observer", position_into(o.observer),
+                                      "Draw what is culled for an eye at X,Y[,H] as wireframe");
+  c->add_option("--crs", o.crs,
+                "CRS of the positions, such as OGC:CRS84; the scene's unless given");
+  c->add_option("--width", o.width_px, "Pixels; 1600 unless given")->check(CLI::Range(16, 16'384));
+  add_common(*c, o.common);
+  c->callback([&] { run = [&o] { return run_preview(o); }; });
+}
+
+void add_check(CLI::App& app, CheckOptions& o, std::function<int()>& run) {
+  CLI::App* c = app.add_subcommand("check", "Verify checksums and invariants of a scene");
+  c->footer("Example:\n  scarp check alps.scene");
+  c->add_option("scene", o.scene, "A scene")->required();
+  add_common(*c, o.common);
+  c->callback([&] { run = [&o] { return run_check(o); }; });
+}
+
+/// "Error: message" without line breaks, so that scripts can rely on one line.
+int report(const std::string& message, int exit_code) {
+  std::string line = message;
+  std::replace(line.begin(), line.end(), '\n', ' ');
+  fmt::print(stderr, "scarp: {}\n", line);
+  return exit_code;
+}
+
+}  // namespace
+
+int run_command_line(int argc, char** argv) {
+  CLI::App app("What can be seen from where, on terrain.");
+  app.set_version_flag("--version", "scarp " SCARP_VERSION);
+  app.require_subcommand(1);
+  app.get_formatter()->column_width(34);
+  BuildOptions build;
+  CullOptions cull;
+  VerifyOptions verify;
+  PreviewOptions preview;
+  CheckOptions check;
+  std::function<int()> run;
+  add_build(app, build, run);
+  add_cull(app, cull, run);
+  add_verify(app, verify, run);
+  add_preview(app, preview, run);
+  add_check(app, check, run);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& e) {
+    return app.exit(e);
+  } catch (const CLI::ParseError& e) {
+    return report(fmt::format("{}; see scarp --help", e.what()), 2);
+  } catch (const Error& e) {
+    return report(e.what(), 2);
+  }
+  try {
+    for (CommonOptions* common :
+         {&build.common, &cull.common, &verify.common, &preview.common, &check.common}) {
+      if (!common->memory_budget_bytes) common->memory_budget_bytes = machine_memory_bytes() / 2;
+      if (common->threads) set_thread_count(common->threads);
+    }
+    return run();
+  } catch (const Error& e) {
+    return report(e.what(), e.code() == ErrorCode::kUsage ? 2 : 1);
+  } catch (const std::bad_alloc&) {
+    return report("out of memory; give a smaller DEM or a larger --max-error", 1);
+  } catch (const std::exception& e) {
+    return report(fmt::format("unexpected failure: {}", e.what()), 1);
+  }
+}
+
+}  // namespace scarp

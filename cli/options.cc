@@ -1,0 +1,77 @@
+#include "cli/options.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <string_view>
+
+#include "core/error/error.h"
+
+namespace scarp {
+namespace {
+
+/// The number that text begins with, finite; text is left with what follows it.
+std::optional<double> take_number(std::string_view& text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || !std::isfinite(value)) return {};
+  text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+  return value;
+}
+
+bool take(std::string_view& text, std::string_view start) {
+  if (!text.starts_with(start)) return false;
+  text.remove_prefix(start.size());
+  return true;
+}
+
+}  // namespace
+
+TypedPosition parse_position(const std::string& text) {
+  TypedPosition position;
+  position.text = text;
+  std::string_view rest = text;
+  const auto x = take_number(rest);
+  const bool comma = take(rest, ",");
+  const auto y = take_number(rest);
+  bool understood = x && comma && y;
+  if (understood && take(rest, ",")) {
+    const auto height_m = take_number(rest);
+    understood = height_m.has_value();
+    position.height_m = height_m.value_or(0);
+    position.above_datum = take(rest, "asl");
+  }
+  if (!understood || !rest.empty())
+    throw Error(ErrorCode::kUsage,
+                fmt::format("position '{}': not understood; X,Y or X,Y,H was expected, H in metres "
+                            "above ground or as 1200asl",
+                            text));
+  position.x = *x;
+  position.y = *y;
+  return position;
+}
+
+std::uint64_t parse_bytes(const std::string& text) {
+  std::string_view rest = text;
+  const auto value = take_number(rest);
+  double factor = 1;
+  if (take(rest, "K") || take(rest, "k"))
+    factor = 0x1p10;
+  else if (take(rest, "M"))
+    factor = 0x1p20;
+  else if (take(rest, "G"))
+    factor = 0x1p30;
+  else if (take(rest, "T"))
+    factor = 0x1p40;
+  if (factor > 1) take(rest, "i");
+  take(rest, "B");
+  if (!value || !rest.empty() || *value * factor < 1 || *value * factor > 0x1p62)
+    throw Error(ErrorCode::kUsage,
+                fmt::format("size '{}': not understood; a number with K, M, G or T was expected, "
+                            "such as 2GiB",
+                            text));
+  return static_cast<std::uint64_t>(*value * factor);
+}
+
+}  // namespace scarp

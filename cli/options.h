@@ -1,0 +1,90 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ingest/dem/dem.h"
+
+namespace scarp {
+
+/// What every command understands.
+struct CommonOptions {
+  bool json = false;
+  bool overwrite = false;
+  int threads = 0;                        ///< 0: all processors
+  std::uint64_t memory_budget_bytes = 0;  ///< half of the machine's unless given
+};
+
+/// A position as typed: "X,Y[,H]", H in metres above ground (2 unless given) or "1200asl", above
+/// the height datum of the data.
+struct TypedPosition {
+  double x = 0;
+  double y = 0;
+  double height_m = 2;
+  bool above_datum = false;
+  std::string text;  ///< as typed, for messages
+};
+
+struct BuildOptions {
+  CommonOptions common;
+  DemOptions dem;
+  std::vector<std::string> dem_files;
+  std::string scene;
+  std::optional<double> max_error_m;
+  std::optional<std::uint32_t> vertices;
+  std::string footprints_file;
+  std::string footprints_height_field = "height";
+  int sectors = 16;
+  int subsectors = 4;
+  int group_triangles = 128;
+  std::uint32_t min_group_triangles = 30;
+  std::optional<std::uint32_t> seeds;
+  std::uint32_t max_groups = 0;
+  std::uint64_t seed = 1;
+  std::optional<TypedPosition> observer;
+  std::string crs;  ///< of the observer; empty: the data's
+};
+
+struct CullOptions {
+  CommonOptions common;
+  std::string scene;
+  TypedPosition camera;
+  std::string crs;
+  std::optional<double> azimuth_deg;  ///< of the view's middle; none: all around
+  double field_of_view_deg = 90;
+};
+
+struct VerifyOptions {
+  CommonOptions common;
+  std::string scene;
+  int eyes = 8;
+  std::vector<double> heights_m = {2, 50, 300, 1000};
+  std::uint64_t seed = 1;
+};
+
+struct PreviewOptions {
+  CommonOptions common;
+  std::string scene;
+  std::string output;
+  std::optional<TypedPosition> camera;  ///< none: from above
+  std::optional<TypedPosition> target;
+  bool three_d = false;                   ///< from the default camera
+  std::optional<TypedPosition> observer;  ///< what it does not see is drawn as wireframe
+  std::string crs;
+  int width_px = 1600;
+};
+
+struct CheckOptions {
+  CommonOptions common;
+  std::string scene;
+};
+
+/// Reads "X,Y[,H]". Throws Error{kUsage}.
+TypedPosition parse_position(const std::string& text);
+
+/// Reads "2GiB", "512M", "1000000" and the like as bytes. Throws Error{kUsage}.
+std::uint64_t parse_bytes(const std::string& text);
+
+}  // namespace scarp
