@@ -1,0 +1,175 @@
+#include "core/sight/line_of_sight.h"
+
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include "core/geodesy/predicates.h"
+#include "core/sight/lattice_algebra.h"
+
+namespace scarp {
+namespace {
+
+bool same_place(const Position& a, const Position& b) {
+  return a.x_m == b.x_m && a.y_m == b.y_m;
+}
+
+/// The vertices of a triangle, counter-clockwise.
+std::array<Position, 3> corners_of(const Tin& tin, TriangleIndex t) {
+  const auto& [a, b, c] = tin.triangles[t];
+  return {tin.vertices[a], tin.vertices[b], tin.vertices[c]};
+}
+
+/// Whether the segment, just after its end `from`, runs strictly under ground: `from` lies strictly
+/// under a triangle that the direction to `to` stays over for a while. Only at the border of
+/// the data does this differ from `from` being strictly under ground.
+bool starts_under_ground(const TinIndex& index, const Position& from, const Position& to) {
+  bool under = false;
+  index.visit_triangles_at(from.x_m, from.y_m, [&](TriangleIndex t) {
+    const auto [a, b, c] = corners_of(index.tin(), t);
+    const auto leaves_over = [&](const Position& p, const Position& q) {
+      return orient2d(p, q, from) == 0 && orient2d(p, q, to) < 0;
+    };
+    if (orient3d(a, b, c, from) < 0 && !leaves_over(a, b) && !leaves_over(b, c) &&
+        !leaves_over(c, a))
+      under = true;
+  });
+  return under;
+}
+
+/// Whether p, which is on the line through a and b in plan, lies strictly between them.
+bool is_between(const Position& a, const Position& b, const Position& p) {
+  const auto strictly = [](double low, double at, double high) {
+    return low < at ? at < high : low > at && at > high;
+  };
+  return a.x_m != b.x_m ? strictly(a.x_m, p.x_m, b.x_m) : strictly(a.y_m, p.y_m, b.y_m);
+}
+
+/// Place along a -> b, within it, where it crosses the line through u and v in plan.
+Fraction crossing(const Position& a, const Position& b, const Position& u, const Position& v) {
+  const LatticeVector along = vector_from(u, v);
+  const Int128 before = cross_in_plan(along, vector_from(u, a));
+  const Int128 after = cross_in_plan(along, vector_from(u, b));
+  return {before < 0 ? -before : before, after < 0 ? -after : after};
+}
+
+/// A place along the line where ground stands strictly above it.
+struct Obstacle {
+  Fraction at;
+  VertexIndex from, to;
+};
+
+/// Calls found(obstacle) for each vertex and edge strictly above the open segment a-b (not
+/// vertical), until it returns true. An edge that runs along the segment in plan counts by its
+/// vertices and by the triangles at the segment's ends: the highest place over the line is at one
+/// of those.
+template <class Found>
+bool visit_obstacles(const TinIndex& index, const Position& a, const Position& b, Found found) {
+  const std::vector<Position>& vertices = index.tin().vertices;
+  const std::array<Position, 2> ends{a, b};
+  const HeightFloor floor(a, std::span(ends).last(1));
+  const auto visit_vertex = [&](VertexIndex w) {
+    const Position& p = vertices[w];
+    if (!is_between(a, b, p) || above_line(a, b, p) <= 0) return false;
+    const bool along_x = a.x_m != b.x_m;
+    const LatticeVector from_a = vector_from(a, p), to_b = vector_from(p, b);
+    const Int128 before = along_x ? from_a.x : from_a.y, after = along_x ? to_b.x : to_b.y;
+    return found({{before < 0 ? -before : before, after < 0 ? -after : after}, w, w});
+  };
+  return index.visit_edges(ends, floor, [&](std::uint32_t e) {
+    const MeshEdge& edge = index.edges()[e];
+    const Position& u = vertices[edge.from];
+    const Position& v = vertices[edge.to];
+    const int u_side = orient2d(a, b, u), v_side = orient2d(a, b, v);
+    if (u_side * v_side > 0) return false;
+    if (u_side == 0 && visit_vertex(edge.from)) return true;
+    if (v_side == 0 && visit_vertex(edge.to)) return true;
+    if (u_side * v_side == 0 || orient2d(u, v, a) * orient2d(u, v, b) >= 0) return false;
+    // Where v lies on the left, a-u-v is counter-clockwise, and the edge is above the line exactly
+    // where b lies below their plane; where v lies on the right, the sign is the other one.
+    if (orient3d(a, u, v, b) * v_side >= 0) return false;
+    return found({crossing(a, b, u, v), edge.from, edge.to});
+  });
+}
+
+/// The stretch of a-b in plan that lies over the closed triangle.
+struct Stretch {
+  Fraction first, last;
+};
+std::optional<Stretch> stretch_over(const Tin& tin, TriangleIndex t, const Position& a,
+                                    const Position& b) {
+  const std::array<Position, 3> corners = corners_of(tin, t);
+  Stretch stretch{kFirstEnd, kLastEnd};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Position& u = corners[i];
+    const Position& v = corners[(i + 1) % 3];
+    const int a_side = orient2d(u, v, a), b_side = orient2d(u, v, b);
+    if (a_side < 0 && b_side < 0) return {};
+    if (a_side >= 0 && b_side >= 0) continue;
+    const Fraction at = crossing(a, b, u, v);
+    if (a_side < 0 && compare(stretch.first, at) < 0) stretch.first = at;
+    if (b_side < 0 && compare(at, stretch.last) < 0) stretch.last = at;
+  }
+  if (compare(stretch.first, stretch.last) > 0) return {};
+  return stretch;
+}
+
+/// Whether in plan some place of a-b over void lies between two places of it over ground.
+bool has_void_between_ground(const TinIndex& index, const Position& a, const Position& b) {
+  if (!index.may_meet_border(a, b)) return false;
+  std::vector<Stretch> stretches;
+  index.visit_triangles_along(a, b, [&](TriangleIndex t) {
+    if (const auto stretch = stretch_over(index.tin(), t, a, b)) stretches.push_back(*stretch);
+  });
+  std::sort(stretches.begin(), stretches.end(),
+            [](const Stretch& s, const Stretch& t) { return compare(s.first, t.first) < 0; });
+  for (std::size_t i = 1; i < stretches.size(); ++i) {
+    Stretch& next = stretches[i];
+    const Fraction& reached = stretches[i - 1].last;
+    if (compare(reached, next.first) < 0) return true;
+    if (compare(next.last, reached) < 0) next.last = reached;
+  }
+  return false;
+}
+
+bool is_over_enclosed_void(const TinIndex& index, const Position& p) {
+  return index.triangle_at(p.x_m, p.y_m) == kNone && index.is_in_hole(p.x_m, p.y_m);
+}
+
+bool is_strictly_under(const TinIndex& index, const Position& p) {
+  return index.above_ground(p).value_or(1) < 0;
+}
+
+}  // namespace
+
+bool is_blocked(const TinIndex& index, const Position& a, const Position& b) {
+  if (same_place(a, b)) return is_strictly_under(index, a.z_m < b.z_m ? a : b);
+  return starts_under_ground(index, a, b) || starts_under_ground(index, b, a) ||
+         visit_obstacles(index, a, b, [](const Obstacle&) { return true; });
+}
+
+Sight line_of_sight(const TinIndex& index, const Position& a, const Position& b) {
+  if (is_blocked(index, a, b)) return Sight::kHidden;
+  if (is_over_enclosed_void(index, a) || is_over_enclosed_void(index, b)) return Sight::kUnknown;
+  if (!same_place(a, b) && has_void_between_ground(index, a, b)) return Sight::kUnknown;
+  return Sight::kVisible;
+}
+
+std::optional<Blocker> first_blocker(const TinIndex& index, const Position& a, const Position& b) {
+  if (same_place(a, b)) {
+    if (!is_blocked(index, a, b)) return {};
+    return Blocker{a.z_m <= b.z_m ? 0.0 : 1.0, kNone, kNone};
+  }
+  if (starts_under_ground(index, a, b)) return Blocker{0, kNone, kNone};
+  std::optional<Obstacle> nearest;
+  visit_obstacles(index, a, b, [&](const Obstacle& obstacle) {
+    const int order = nearest ? compare(obstacle.at, nearest->at) : -1;
+    if (order < 0) nearest = obstacle;
+    return false;
+  });
+  if (nearest) return Blocker{to_double(nearest->at), nearest->from, nearest->to};
+  if (starts_under_ground(index, b, a)) return Blocker{1, kNone, kNone};
+  return {};
+}
+
+}  // namespace scarp
