@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "core/threads/parallel_for.h"
@@ -56,29 +57,46 @@ double exaggeration_for(double relief_m, double extent_m) {
   return 20;
 }
 
-/// Eye from which, looking along the axes, every corner is just inside the picture: the four side
-/// planes are pushed against the corners, and the farther back of both directions decides.
-Position eye_that_fits(std::span<const Position> corners, const Axes& axes, double tangent_x,
-                       double tangent_y) {
-  double right = -1e300, left = -1e300, top = -1e300, bottom = -1e300;
-  for (const Position& corner : corners) {
-    const double x = dot(corner, axes.right);
-    const double y = dot(corner, axes.up);
-    const double ahead = dot(corner, axes.forward);
-    right = std::max(right, x - tangent_x * ahead);
-    left = std::max(left, -x - tangent_x * ahead);
-    top = std::max(top, y - tangent_y * ahead);
-    bottom = std::max(bottom, -y - tangent_y * ahead);
+/// Finds the eye from which, looking along the axes, every point is just inside the picture: the
+/// four side planes are pushed against the points, and the farther back of both directions decides.
+class Fit {
+ public:
+  Fit(const Axes& axes, double tangent_x, double tangent_y)
+      : axes_(axes), tangent_x_(tangent_x), tangent_y_(tangent_y) {}
+
+  void add(const Position& p) {
+    const double x = dot(p, axes_.right);
+    const double y = dot(p, axes_.up);
+    const double ahead = dot(p, axes_.forward);
+    right_ = std::max(right_, x - tangent_x_ * ahead);
+    left_ = std::max(left_, -x - tangent_x_ * ahead);
+    top_ = std::max(top_, y - tangent_y_ * ahead);
+    bottom_ = std::max(bottom_, -y - tangent_y_ * ahead);
   }
-  const double eye_x = (right - left) / 2;
-  const double eye_y = (top - bottom) / 2;
-  const double eye_ahead =
-      std::min(-(right + left) / (2 * tangent_x), -(top + bottom) / (2 * tangent_y));
-  const auto along = [&](double Position::*c) {
-    return eye_x * axes.right.*c + eye_y * axes.up.*c + eye_ahead * axes.forward.*c;
-  };
-  return {along(&Position::x_m), along(&Position::y_m), along(&Position::z_m)};
-}
+
+  /// Requires a point added. The eye is `back_m` farther back than it need be.
+  Position eye(double back_m) const {
+    const double x = (right_ - left_) / 2;
+    const double y = (top_ - bottom_) / 2;
+    const double ahead =
+        std::min(-(right_ + left_) / (2 * tangent_x_), -(top_ + bottom_) / (2 * tangent_y_)) -
+        back_m;
+    const auto along = [&](double Position::*c) {
+      return x * axes_.right.*c + y * axes_.up.*c + ahead * axes_.forward.*c;
+    };
+    return {along(&Position::x_m), along(&Position::y_m), along(&Position::z_m)};
+  }
+
+ private:
+  static constexpr double kNothing = std::numeric_limits<double>::lowest();
+  Axes axes_;
+  double tangent_x_;
+  double tangent_y_;
+  double right_ = kNothing;
+  double left_ = kNothing;
+  double top_ = kNothing;
+  double bottom_ = kNothing;
+};
 
 }  // namespace
 
@@ -135,40 +153,36 @@ Projection ortho_from_above(const Bounds& bounds, int width_px, int height_px, d
   return projection;
 }
 
-View default_view(const Bounds& bounds, int width_px, int height_px) {
+View default_view(std::span<const Position> ground, int width_px, int height_px) {
   constexpr double kAzimuthRad =
       200 * std::numbers::pi / 180;  // where the eye is: south-south-west
   constexpr double kElevationRad = 33 * std::numbers::pi / 180;
-  constexpr double kMargin = 0.95;  // of the picture is taken by the box
-  const double extent_m =
-      std::max({bounds.high.x_m - bounds.low.x_m, bounds.high.y_m - bounds.low.y_m, 1.0});
+  constexpr double kFilled = 0.95;  // of the picture is taken by the ground
+  const Bounds bounds = bounds_of(ground);
+  const double extent_x_m = bounds.high.x_m - bounds.low.x_m;
+  const double extent_y_m = bounds.high.y_m - bounds.low.y_m;
+  const double extent_m = std::max({extent_x_m, extent_y_m, 1.0});
 
   View view;
   view.base_z_m = bounds.low.z_m;
   view.vertical_field_of_view_rad = 0.5;
-  view.vertical_exaggeration = exaggeration_for(
-      bounds.high.z_m - bounds.low.z_m,
-      std::min(bounds.high.x_m - bounds.low.x_m, bounds.high.y_m - bounds.low.y_m));
-  std::array<Position, 8> corners;
-  for (std::size_t i = 0; i < 8; ++i) {
-    corners[i] = exaggerated(view, {(i & 1) != 0 ? bounds.high.x_m : bounds.low.x_m,
-                                    (i & 2) != 0 ? bounds.high.y_m : bounds.low.y_m,
-                                    (i & 4) != 0 ? bounds.high.z_m : bounds.low.z_m});
-  }
+  view.vertical_exaggeration =
+      exaggeration_for(bounds.high.z_m - bounds.low.z_m, std::min(extent_x_m, extent_y_m));
   const Position forward = {-std::sin(kAzimuthRad) * std::cos(kElevationRad),
                             -std::cos(kAzimuthRad) * std::cos(kElevationRad),
                             -std::sin(kElevationRad)};
-  const Axes axes = axes_of(forward, view.up);
-  const double tangent_y = kMargin * std::tan(view.vertical_field_of_view_rad / 2);
-  view.eye = eye_that_fits(corners, axes, tangent_y * width_px / height_px, tangent_y);
-  // A box of no extent puts the eye into it; a step back keeps the view defined.
-  view.eye =
-      minus(view.eye, {axes.forward.x_m * 0.01 * extent_m, axes.forward.y_m * 0.01 * extent_m,
-                       axes.forward.z_m * 0.01 * extent_m});
-  view.target = {view.eye.x_m + extent_m * axes.forward.x_m,
-                 view.eye.y_m + extent_m * axes.forward.y_m,
-                 view.eye.z_m + extent_m * axes.forward.z_m};
+  const double tangent_y = kFilled * std::tan(view.vertical_field_of_view_rad / 2);
+  Fit fit(axes_of(forward, view.up), tangent_y * width_px / height_px, tangent_y);
+  const double block_base_z_m = bounds.low.z_m - kBlockBaseShare * extent_m;
+  for (const Position& p : ground) {
+    fit.add(exaggerated(view, p));
+    fit.add({p.x_m, p.y_m, block_base_z_m});
+  }
+  // Ground without extent would put the eye into it: a little farther back, and a near plane.
   view.near_m = 0.001 * extent_m;
+  view.eye = fit.eye(2 * view.near_m);
+  view.target = {view.eye.x_m + extent_m * forward.x_m, view.eye.y_m + extent_m * forward.y_m,
+                 view.eye.z_m + extent_m * forward.z_m};
   return view;
 }
 

@@ -53,9 +53,13 @@ Projection look_at(const View& view, int width_px, int height_px);
 Projection ortho_from_above(const Bounds& bounds, int width_px, int height_px,
                             double margin_px = 0);
 
-/// A view from the south-south-west and above in which the whole box is just seen, and flat scenes
-/// are exaggerated until their relief is a tenth of their extent (at most 20 times).
-View default_view(const Bounds& bounds, int width_px, int height_px);
+/// How far below the lowest ground a block of ground goes, as a share of its greater extent.
+inline constexpr double kBlockBaseShare = 0.02;
+
+/// A view from the south-south-west and above in which all of the ground, as a block, is just seen.
+/// Flat scenes are exaggerated until their relief is a tenth of their extent (at most 20 times).
+/// Requires at least one position. Cost: O(n).
+View default_view(std::span<const Position> ground, int width_px, int height_px);
 
 /// Projects every point. Cost: O(n), in parallel.
 std::vector<ClipPosition> project_all(const Projection& projection,

@@ -337,6 +337,66 @@ void fill_triangle(Target& target, const Tile& tile, const ScreenTriangle& t) {
   fill(1, 2, middle, bottom);
 }
 
+/// One call of rasterise: what its steps share.
+struct Drawing {
+  Target& target;
+  std::span<const ClipPosition> vertices;
+  std::span<const std::array<VertexIndex, 3>> triangles;
+  std::span<const std::uint32_t> objects;
+  Screen screen;
+  Tiling tiling;
+  std::vector<ScreenVertex> placed = {};  // [vertices]
+};
+
+void place_vertices(Drawing& drawing) {
+  const std::size_t count = drawing.vertices.size();
+  drawing.placed.resize(count);
+  parallel_for((count + kChunkTriangles - 1) / kChunkTriangles, [&](std::size_t chunk) {
+    const std::size_t end = std::min(count, (chunk + 1) * kChunkTriangles);
+    for (std::size_t i = chunk * kChunkTriangles; i < end; ++i) {
+      drawing.placed[i] = drawing.screen.place_if_whole(drawing.vertices[i]);
+    }
+  });
+}
+
+/// Prepares and bins the triangles [begin, end).
+void prepare_chunk(const Drawing& drawing, std::size_t begin, std::size_t end, Chunk& chunk) {
+  constexpr std::uint32_t kHidesAll = kLeft | kRight | kBelow | kAbove | kTooNear | kTooFar;
+  constexpr std::uint32_t kCuts = kTooNear | kBeyondGuard;
+  chunk.triangles.clear();
+  for (std::size_t i = begin; i < end; ++i) {
+    const auto& [a, b, c] = drawing.triangles[i];
+    assert(std::max({a, b, c}) < drawing.vertices.size());
+    const ScreenVertex& at_a = drawing.placed[a];
+    const ScreenVertex& at_b = drawing.placed[b];
+    const ScreenVertex& at_c = drawing.placed[c];
+    if ((at_a.outside & at_b.outside & at_c.outside & kHidesAll) != 0) continue;
+    const std::uint32_t object =
+        drawing.objects.empty() ? static_cast<std::uint32_t>(i) : drawing.objects[i];
+    assert(object != kNone);
+    if (((at_a.outside | at_b.outside | at_c.outside) & kCuts) == 0) {
+      prepare(drawing.tiling, at_a, at_b, at_c, object, chunk.triangles);
+    } else {
+      const Polygon whole = {{drawing.vertices[a], drawing.vertices[b], drawing.vertices[c]}, 3};
+      prepare_cut(drawing.screen, drawing.tiling, whole, object, chunk.triangles);
+    }
+  }
+  bin(drawing.tiling, chunk);
+}
+
+void draw_tile(const Drawing& drawing, std::span<const Chunk> chunks, std::size_t index) {
+  const Tiling& tiling = drawing.tiling;
+  const int left = static_cast<int>(index) % tiling.columns * kTileWidthPx;
+  const int top = static_cast<int>(index) / tiling.columns * kTileHeightPx;
+  const Tile tile = {left, top, std::min(left + kTileWidthPx, tiling.width_px),
+                     std::min(top + kTileHeightPx, tiling.height_px)};
+  for (const Chunk& chunk : chunks) {
+    for (std::uint32_t i = chunk.first[index]; i < chunk.first[index + 1]; ++i) {
+      fill_triangle(drawing.target, tile, chunk.triangles[chunk.entries[i]]);
+    }
+  }
+}
+
 Target target_of(int width_px, int height_px) {
   assert(width_px >= 1 && width_px <= kGreatestSizePx);
   assert(height_px >= 1 && height_px <= kGreatestSizePx);
@@ -364,59 +424,23 @@ void rasterise(Target& target, std::span<const ClipPosition> vertices,
                std::span<const std::uint32_t> objects) {
   assert(objects.empty() || objects.size() == triangles.size());
   assert(target.object.empty() || target.object.size() == target.depth.size());
-  const Screen screen(target.width_px, target.height_px);
-  const Tiling tiling(target);
+  Drawing drawing = {
+      target,        vertices, triangles, objects, Screen(target.width_px, target.height_px),
+      Tiling(target)};
+  place_vertices(drawing);
 
-  std::vector<ScreenVertex> placed(vertices.size());
-  parallel_for((vertices.size() + kChunkTriangles - 1) / kChunkTriangles, [&](std::size_t c) {
-    const std::size_t end = std::min(vertices.size(), (c + 1) * kChunkTriangles);
-    for (std::size_t i = c * kChunkTriangles; i < end; ++i) {
-      placed[i] = screen.place_if_whole(vertices[i]);
-    }
-  });
-
-  const auto prepare_chunk = [&](std::size_t begin, std::size_t end, Chunk& chunk) {
-    chunk.triangles.clear();
-    for (std::size_t i = begin; i < end; ++i) {
-      const auto& [a, b, c] = triangles[i];
-      assert(a < vertices.size() && b < vertices.size() && c < vertices.size());
-      const ScreenVertex &va = placed[a], &vb = placed[b], &vc = placed[c];
-      constexpr std::uint32_t kFrustum = kLeft | kRight | kBelow | kAbove | kTooNear | kTooFar;
-      if ((va.outside & vb.outside & vc.outside & kFrustum) != 0) continue;
-      const std::uint32_t object = objects.empty() ? static_cast<std::uint32_t>(i) : objects[i];
-      assert(object != kNone);
-      if (((va.outside | vb.outside | vc.outside) & (kTooNear | kBeyondGuard)) == 0) {
-        prepare(tiling, va, vb, vc, object, chunk.triangles);
-      } else {
-        prepare_cut(screen, tiling, {{vertices[a], vertices[b], vertices[c]}, 3}, object,
-                    chunk.triangles);
-      }
-    }
-    bin(tiling, chunk);
-  };
-  const auto draw_tile = [&](std::size_t index, std::span<const Chunk> chunks) {
-    const int left = static_cast<int>(index) % tiling.columns * kTileWidthPx;
-    const int top = static_cast<int>(index) / tiling.columns * kTileHeightPx;
-    const Tile tile = {left, top, std::min(left + kTileWidthPx, target.width_px),
-                       std::min(top + kTileHeightPx, target.height_px)};
-    for (const Chunk& chunk : chunks) {
-      for (std::uint32_t i = chunk.first[index]; i < chunk.first[index + 1]; ++i) {
-        fill_triangle(target, tile, chunk.triangles[chunk.entries[i]]);
-      }
-    }
-  };
-
-  std::vector<Chunk> chunks(kBatchChunks);
   constexpr std::size_t kBatch = kChunkTriangles * kBatchChunks;
+  std::vector<Chunk> chunks(kBatchChunks);
   for (std::size_t begin = 0; begin < triangles.size(); begin += kBatch) {
     const std::size_t end = std::min(triangles.size(), begin + kBatch);
     const std::size_t used = (end - begin + kChunkTriangles - 1) / kChunkTriangles;
     parallel_for(used, [&](std::size_t c) {
       const std::size_t first = begin + c * kChunkTriangles;
-      prepare_chunk(first, std::min(end, first + kChunkTriangles), chunks[c]);
+      prepare_chunk(drawing, first, std::min(end, first + kChunkTriangles), chunks[c]);
     });
-    parallel_for(tiling.count(),
-                 [&](std::size_t tile) { draw_tile(tile, std::span(chunks).first(used)); });
+    parallel_for(drawing.tiling.count(), [&](std::size_t tile) {
+      draw_tile(drawing, std::span(chunks).first(used), tile);
+    });
   }
 }
 

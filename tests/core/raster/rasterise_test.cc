@@ -318,6 +318,21 @@ TEST(Rasterise, GroundUnderTheEyeHasNoGaps) {
   }
 }
 
+TEST(Rasterise, CornersFarBeyondThePictureAreCutNotOverflown) {
+  // The picture lies on both sides of the edge y = 0, whose ends are 10^12 pictures away.
+  const std::vector<ClipPosition> clip = {
+      {-1e9, 0, 2e-4, 1e-3}, {1e9, 0, 5e-4, 1e-3}, {0, 1e9, 3e-4, 1e-3}, {0, -1e9, 3e-4, 1e-3}};
+  const std::vector<Corners> triangles = {{0, 1, 2}, {0, 1, 3}};
+  Target target = empty_target(64, 64);
+  rasterise(target, clip, triangles);
+  for (int y = 0; y < 64; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      ASSERT_EQ(target.object[target.index(x, y)], y < 32 ? 0U : 1U) << x << ' ' << y;
+      ASSERT_NEAR(target.depth[target.index(x, y)], 0.35, 1e-6);
+    }
+  }
+}
+
 TEST(Rasterise, OfEqualDepthsTheLowestObjectStays) {
   const std::vector<ClipPosition> clip = {{-1, -1, 0.5, 1}, {1, -1, 0.5, 1}, {0, 1, 0.5, 1}};
   const std::vector<Corners> triangles(3, Corners{0, 1, 2});
