@@ -153,6 +153,7 @@ class SectionFile {
   std::uint32_t width(std::string_view section) const;
 
   const std::string& name() const { return name_; }
+  std::uint64_t size() const { return bytes_.size(); }  ///< bytes
 
   /// Throws Error{kCorrupt}: this file's name, what was found, and what to do.
   [[noreturn]] void fail(const std::string& found) const;
