@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tiles/store/part_file.h"
+
+namespace scarp {
+
+/// A point of a map, in units of its CRS: x east or longitude, y north or latitude.
+struct MapPoint {
+  double x;
+  double y;
+};
+
+/// Corners of a closed ring in order; the first is not repeated.
+using Ring = std::vector<MapPoint>;
+
+/// A group as a feature. trace_groups gives its rings as vertices.
+struct GroupPolygon {
+  std::int64_t group = 0;
+  std::int64_t parent = -1;  ///< -1: none, written as null
+  std::int64_t triangles = 0;
+  double area_m2 = 0;
+  double height_min_m = 0;
+  double height_max_m = 0;
+  std::vector<std::vector<Ring>> polygons;  ///< each: outer ring, then holes
+};
+
+/// Writes the layer "groups" of a GeoPackage: a multipolygon a group with the fields group, parent,
+/// triangles, area_m2, height_min_m, height_max_m, and a spatial index. The same groups give the
+/// same bytes: the file's date is a fixed one.
+///
+/// @param crs_wkt  empty: none
+///
+/// Requires rings of at least three corners (asserted).
+/// Errors: kResource with GDAL's own words or from the disk, kInput where the file exists and is
+/// not to be replaced, or the CRS is not WKT. Nothing is left behind. Memory: the file, once more
+/// beside the polygons.
+void write_group_polygons(const std::string& path, std::span<const GroupPolygon> groups,
+                          const std::string& crs_wkt, Existing existing);
+
+}  // namespace scarp

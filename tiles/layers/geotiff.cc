@@ -1,0 +1,107 @@
+#include "tiles/layers/geotiff.h"
+
+#include <cpl_string.h>
+#include <fmt/format.h>
+#include <gdal_priv.h>
+#include <ogr_spatialref.h>
+
+#include <cassert>
+
+#include "core/error/error.h"
+#include "tiles/layers/gdal_session.h"
+#include "tiles/layers/spatial_reference.h"
+
+namespace scarp {
+namespace {
+
+struct LayerData {
+  GDALDataType type;
+  void* start;
+  std::size_t count;
+  bool is_float;
+  const char* predictor;
+};
+
+LayerData data_of(const LayerSamples& samples) {
+  // GDAL's in-memory raster takes a pointer that it could write through; nothing here does.
+  const auto start = [](const auto& span) {
+    return const_cast<void*>(static_cast<const void*>(span.data()));
+  };
+  if (const auto* bytes = std::get_if<std::span<const std::uint8_t>>(&samples))
+    return {GDT_Byte, start(*bytes), bytes->size(), false, "NO"};  // classes: differences only cost
+  if (const auto* ints = std::get_if<std::span<const std::int32_t>>(&samples))
+    return {GDT_Int32, start(*ints), ints->size(), false, "YES"};
+  if (const auto* counts = std::get_if<std::span<const std::uint32_t>>(&samples))
+    return {GDT_UInt32, start(*counts), counts->size(), false, "YES"};
+  const auto& floats = std::get<std::span<const float>>(samples);
+  return {GDT_Float32, start(floats), floats.size(), true, "YES"};
+}
+
+/// The samples as a GDAL dataset, without a copy.
+GDALDatasetUniquePtr memory_dataset(const RasterLayer& layer, const LayerData& data,
+                                    const GdalSession& session, const std::string& path) {
+  GDALDriver* driver = GetGDALDriverManager()->GetDriverByName("MEM");
+  if (driver == nullptr) session.fail(path);
+  GDALDatasetUniquePtr dataset(
+      driver->Create("", layer.columns, layer.rows, 0, data.type, nullptr));
+  if (!dataset) session.fail(path);
+  CPLStringList options;
+  options.SetNameValue("DATAPOINTER", fmt::format("{}", fmt::ptr(data.start)).c_str());
+  if (dataset->AddBand(data.type, options.List()) != CE_None) session.fail(path);
+  return dataset;
+}
+
+void describe(GDALDataset& dataset, const RasterLayer& layer) {
+  std::array<double, 6> geotransform = layer.geotransform;
+  dataset.SetGeoTransform(geotransform.data());
+  for (const auto& [key, value] : layer.metadata)
+    dataset.SetMetadataItem(key.c_str(), value.c_str());
+  GDALRasterBand& band = *dataset.GetRasterBand(1);
+  if (!layer.band_name.empty()) band.SetDescription(layer.band_name.c_str());
+  if (!layer.unit.empty()) band.SetUnitType(layer.unit.c_str());
+  if (layer.nodata) band.SetNoDataValue(*layer.nodata);
+  if (layer.colours.empty()) return;
+  GDALColorTable table;
+  for (std::size_t i = 0; i < layer.colours.size(); ++i) {
+    const auto& [red, green, blue, alpha] = layer.colours[i];
+    const GDALColorEntry entry = {red, green, blue, alpha};
+    table.SetColorEntry(static_cast<int>(i), &entry);
+  }
+  band.SetColorInterpretation(GCI_PaletteIndex);
+  band.SetColorTable(&table);
+}
+
+}  // namespace
+
+void write_geotiff_cog(const std::string& path, const RasterLayer& layer, Existing existing) {
+  const LayerData data = data_of(layer.samples);
+  assert(layer.columns >= 1 && layer.rows >= 1);
+  assert(data.count ==
+         static_cast<std::size_t>(layer.columns) * static_cast<std::size_t>(layer.rows));
+  assert(layer.colours.empty() || (data.type == GDT_Byte && layer.colours.size() <= 256));
+  PartFile file(path, existing);
+  const GdalSession session;
+  const GDALDatasetUniquePtr source = memory_dataset(layer, data, session, path);
+  describe(*source, layer);
+  if (!layer.crs_wkt.empty()) {
+    const OGRSpatialReference crs = spatial_reference(layer.crs_wkt, path);
+    source->SetSpatialRef(&crs);
+  }
+  CPLStringList options;
+  options.SetNameValue("COMPRESS", "DEFLATE");
+  options.SetNameValue("PREDICTOR", data.predictor);
+  options.SetNameValue("BIGTIFF", "IF_SAFER");
+  options.SetNameValue("OVERVIEW_RESAMPLING", data.is_float ? "AVERAGE" : "NEAREST");
+  GDALDriver* driver = GetGDALDriverManager()->GetDriverByName("COG");
+  if (driver == nullptr) session.fail(path);
+  const std::string built = session.folder() + "/layer.tif";
+  GDALDatasetUniquePtr cog(
+      driver->CreateCopy(built.c_str(), source.get(), TRUE, options.List(), nullptr, nullptr));
+  if (!cog) session.fail(path);
+  cog.reset();  // closing writes the rest
+  session.check(path);
+  file.append(session.bytes_of(built, path));
+  file.commit();
+}
+
+}  // namespace scarp

@@ -1,0 +1,147 @@
+#include "tiles/store/groups_file.h"
+
+#include <fmt/format.h>
+
+#include <cassert>
+#include <cmath>
+
+#include "tiles/store/layout_section.h"
+
+namespace scarp {
+namespace {
+
+constexpr std::uint32_t kGroupsVersion = 1;
+
+static_assert(sizeof(RegionPoint) == 2 * sizeof(double));
+
+/// A GroupNode in two arrays without padding.
+struct NodeLinks {
+  GroupIndex parent;
+  std::array<GroupIndex, 2> children;
+  std::uint32_t triangles;
+};
+struct NodeCircle {
+  double centre_x_m, centre_y_m, radius_m;
+};
+
+std::size_t region_count(const Groups& groups) {
+  return groups.nodes.size() * static_cast<std::size_t>(groups.regions.layout.count);
+}
+
+void read_nodes(Groups& groups, const SectionFile& file) {
+  const auto links = file.copy<std::uint32_t, NodeLinks>("node_links");
+  const auto circles = file.copy<double, NodeCircle>("node_circle");
+  if (links.size() != circles.size() || links.size() >= kNone)
+    file.fail(fmt::format("{} nodes with {} circles", links.size(), circles.size()));
+  for (std::size_t n = 0; n < links.size(); ++n) {
+    groups.nodes.push_back({links[n].parent, links[n].children, links[n].triangles,
+                            circles[n].centre_x_m, circles[n].centre_y_m, circles[n].radius_m});
+  }
+}
+
+void check_nodes(const Groups& groups, const SectionFile& file) {
+  const std::size_t count = groups.nodes.size();
+  if (groups.leaf_count > count)
+    file.fail(fmt::format("{} leaves in a tree of {} nodes", groups.leaf_count, count));
+  for (std::size_t n = 0; n < count; ++n) {
+    const GroupNode& node = groups.nodes[n];
+    const bool is_leaf = n < groups.leaf_count;
+    for (const GroupIndex child : node.children) {
+      if (is_leaf ? child != kNone : child >= n)
+        file.fail(fmt::format("node {} has node {} as a child", n, child));
+      if (!is_leaf && groups.nodes[child].parent != n)
+        file.fail(fmt::format("node {} does not name its parent {}", child, n));
+    }
+    if (!is_leaf && node.children[0] == node.children[1])
+      file.fail(fmt::format("node {} has one child twice", n));
+    if (node.parent != kNone) {
+      if (node.parent <= n || node.parent >= count || node.parent < groups.leaf_count)
+        file.fail(fmt::format("node {} has node {} as its parent", n, node.parent));
+      const auto& siblings = groups.nodes[node.parent].children;
+      if (siblings[0] != n && siblings[1] != n)
+        file.fail(fmt::format("node {} does not name its child {}", node.parent, n));
+    }
+    if (!std::isfinite(node.centre_x_m) || !std::isfinite(node.centre_y_m) ||
+        !std::isfinite(node.radius_m) || node.radius_m < 0)
+      file.fail(fmt::format("node {} has no proper circle", n));
+  }
+}
+
+void check_group_of_triangle(const Groups& groups, const SectionFile& file) {
+  for (std::size_t t = 0; t < groups.group_of_triangle.size(); ++t) {
+    const GroupIndex group = groups.group_of_triangle[t];
+    if (group != kNone && group >= groups.leaf_count)
+      file.fail(fmt::format("triangle {} is in group {} of {}", t, group, groups.leaf_count));
+  }
+}
+
+void check_regions(const Groups& groups, const SectionFile& file) {
+  const Regions& regions = groups.regions;
+  const std::size_t count = region_count(groups);
+  const bool has_none = count == 0 && regions.first.empty();
+  if ((!has_none && regions.first.size() != count + 1) || regions.end_slope.size() != count)
+    file.fail(fmt::format("{} region starts and {} end slopes where {} and {} were expected",
+                          regions.first.size(), regions.end_slope.size(), count + 1, count));
+  std::uint32_t end = 0;
+  for (std::size_t i = 0; i < regions.first.size(); ++i) {
+    if ((i == 0 && regions.first[i] != 0) || regions.first[i] < end)
+      file.fail(fmt::format("region {} begins before the one before it ends", i));
+    end = regions.first[i];
+  }
+  if (end != regions.points.size())
+    file.fail(fmt::format("{} region points where {} were expected", regions.points.size(), end));
+  for (std::size_t i = 0; i < regions.points.size(); ++i) {
+    if (std::isnan(regions.points[i].u_m) || std::isnan(regions.points[i].z_m))
+      file.fail(fmt::format("region point {} is not a number", i));
+  }
+}
+
+}  // namespace
+
+SectionFileWriter groups_writer(const Groups& groups) {
+  const Regions& regions = groups.regions;
+  assert(regions.first.size() == region_count(groups) + 1 ||
+         (groups.nodes.empty() && regions.first.empty()));
+  assert(regions.end_slope.size() == region_count(groups));
+  std::vector<NodeLinks> links;
+  std::vector<NodeCircle> circles;
+  for (const GroupNode& node : groups.nodes) {
+    links.push_back({node.parent, node.children, node.triangles});
+    circles.push_back({node.centre_x_m, node.centre_y_m, node.radius_m});
+  }
+  SectionFileWriter writer(kGroupsKind, kGroupsVersion);
+  add_layout(writer, regions.layout);
+  writer.add<std::uint32_t>("leaf_count", std::span(&groups.leaf_count, 1));
+  writer.add<std::uint32_t>("group_of_tri", std::span(groups.group_of_triangle));
+  writer.add_owned<std::uint32_t>("node_links", links);
+  writer.add_owned<double>("node_circle", circles);
+  writer.add<std::uint32_t>("region_first", std::span(regions.first));
+  writer.add<double>("region_point", std::span(regions.points));
+  writer.add<double>("end_slope", std::span(regions.end_slope));
+  return writer;
+}
+
+void write_groups(const std::string& path, const Groups& groups, Existing existing) {
+  groups_writer(groups).write(path, existing);
+}
+
+Groups read_groups(const SectionFile& file) {
+  file.require(kGroupsKind, kGroupsVersion);
+  Groups groups;
+  const auto leaf_count = file.section<std::uint32_t>("leaf_count");
+  if (leaf_count.size() != 1)
+    file.fail(fmt::format("{} leaf counts where one was expected", leaf_count.size()));
+  groups.leaf_count = leaf_count[0];
+  groups.group_of_triangle = file.copy<std::uint32_t, GroupIndex>("group_of_tri");
+  groups.regions.layout = read_layout(file);
+  groups.regions.first = file.copy<std::uint32_t, std::uint32_t>("region_first");
+  groups.regions.points = file.copy<double, RegionPoint>("region_point");
+  groups.regions.end_slope = file.copy<double, double>("end_slope");
+  read_nodes(groups, file);
+  check_nodes(groups, file);
+  check_group_of_triangle(groups, file);
+  check_regions(groups, file);
+  return groups;
+}
+
+}  // namespace scarp

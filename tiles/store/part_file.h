@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+
+#include "tiles/store/open_file.h"
+
+namespace scarp {
+
+/// What to do where the output is there already.
+enum class Existing {
+  kRefuse,   ///< Error{kInput}, before any work and again at the end
+  kReplace,  ///< readers see the old one or the new one, never a mixture
+};
+
+/// A file that appears under its name whole or not at all. It grows as "<path>.<pid>-<random>.part"
+/// in the same folder; commit() flushes it to the disk and renames it. Without commit(), whatever
+/// the reason, the part is removed and what was there before stays.
+///
+/// The constructor makes the part, so that a missing folder or permission shows before long work.
+/// Errors, of all members: Error{kResource} with the path, the reason and what to do;
+/// Error{kInput} where the output exists and is not to be replaced.
+class PartFile {
+ public:
+  PartFile(std::string path, Existing existing);
+  ~PartFile();
+  PartFile(const PartFile&) = delete;
+  PartFile& operator=(const PartFile&) = delete;
+
+  void append(std::span<const std::byte> bytes);
+
+  /// Flushes the file, renames it, flushes the folder. Once, as the last call.
+  void commit();
+
+ private:
+  std::string path_;
+  std::string part_path_;
+  Existing existing_;
+  OpenFile file_;
+};
+
+/// All of it at once.
+void write_file(const std::string& path, std::span<const std::byte> bytes, Existing existing);
+
+/// "<pid>-<random>", new at each call: for names that no other process chooses.
+std::string unique_suffix();
+
+/// Renames without replacing anything. Returns 0, or the errno (EEXIST where `to` exists).
+int rename_to_new(const std::string& from, const std::string& to);
+
+/// Makes renames and new names in a folder last through a loss of power.
+void flush_folder(const std::string& folder);
+
+/// The folder that a path's last part is in; "." where there is none.
+std::string folder_of(const std::string& path);
+
+}  // namespace scarp

@@ -1,0 +1,178 @@
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <stdio.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <filesystem>
+
+#include "core/error/error.h"
+#include "tiles/store/file_error.h"
+#include "tiles/store/scene.h"
+
+namespace scarp {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kPartMark[] = ".part-";
+constexpr char kOldMark[] = ".old-";
+
+std::string without_trailing_slashes(std::string path) {
+  while (path.size() > 1 && path.back() == '/') path.pop_back();
+  return path;
+}
+
+/// Deletes nothing that is not a scene, whatever --overwrite says.
+void check_target(const std::string& path, Existing existing) {
+  struct stat status;
+  if (::lstat(path.c_str(), &status) != 0) return;
+  if (existing == Existing::kRefuse) throw_exists(path);
+  std::error_code ignored;
+  if (S_ISDIR(status.st_mode) && (is_scene(path) || fs::is_empty(path, ignored))) return;
+  throw Error(ErrorCode::kInput,
+              fmt::format("'{}': is not a scene; only a scene or an empty folder is replaced; "
+                          "choose another name or remove it yourself",
+                          path));
+}
+
+OpenFile open_folder(const std::string& path) {
+  OpenFile folder(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (!folder) throw_write_error(path, errno);
+  return folder;
+}
+
+/// One writer a folder: a lock that ends with the process.
+bool try_lock(const OpenFile& folder) {
+  return ::flock(folder.descriptor(), LOCK_EX | LOCK_NB) == 0;
+}
+
+std::string folder_to_resume(const std::string& path) {
+  const std::vector<std::string> found = unfinished_scenes(path);
+  if (found.size() > 1)
+    throw Error(ErrorCode::kInput,
+                fmt::format("'{}': there are {} unfinished builds ('{}', ...); one was expected; "
+                            "remove the others",
+                            path, found.size(), found[0]));
+  return found.empty() ? "" : found[0];
+}
+
+void make_folder(const std::string& path) {
+  if (::mkdir(path.c_str(), 0777) != 0) throw_write_error(path, errno);
+}
+
+void flush_folders(const std::string& root) {
+  std::error_code failure;
+  for (fs::recursive_directory_iterator i(root, failure), end; !failure && i != end;
+       i.increment(failure)) {
+    if (i->is_directory(failure)) flush_folder(i->path().string());
+  }
+  if (failure) throw_write_error(root, failure.value());
+  flush_folder(root);
+}
+
+void check_listed(const StoredFile& file, const std::string& folder) {
+  struct stat status;
+  const std::string path = folder + "/" + file.name;
+  if (::stat(path.c_str(), &status) != 0) throw_read_error(path, errno);
+  if (static_cast<std::uint64_t>(status.st_size) != file.size)
+    throw Error(
+        ErrorCode::kCorrupt,
+        fmt::format("'{}': {} bytes where {} were written; something else changed it; build "
+                    "again",
+                    path, status.st_size, file.size));
+}
+
+/// Puts `folder` in the place of the scene at `path`, whose files end up at the returned path.
+/// Where the file system can exchange names, no moment is without a scene.
+std::string swap_in(const std::string& folder, const std::string& path) {
+  const std::string old = path + kOldMark + unique_suffix();
+  if (::renameat2(AT_FDCWD, folder.c_str(), AT_FDCWD, path.c_str(), RENAME_EXCHANGE) == 0) {
+    // from a name that kResume would take up to one that it would not
+    return ::rename(folder.c_str(), old.c_str()) == 0 ? old : folder;
+  }
+  if (errno != EINVAL && errno != ENOSYS) throw_write_error(path, errno);
+  if (::rename(path.c_str(), old.c_str()) != 0) throw_write_error(path, errno);
+  if (::rename(folder.c_str(), path.c_str()) != 0) {
+    const int reason = errno;
+    ::rename(old.c_str(), path.c_str());
+    throw_write_error(path, reason);
+  }
+  return old;
+}
+
+}  // namespace
+
+std::vector<std::string> unfinished_scenes(const std::string& path) {
+  const std::string start =
+      fs::path(without_trailing_slashes(path)).filename().string() + kPartMark;
+  std::vector<std::string> found;
+  std::error_code failure;
+  for (fs::directory_iterator i(folder_of(without_trailing_slashes(path)), failure), end;
+       !failure && i != end; i.increment(failure)) {
+    std::error_code ignored;
+    if (i->path().filename().string().starts_with(start) && i->is_directory(ignored))
+      found.push_back(i->path().string());
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+SceneWriter::SceneWriter(std::string path, Existing existing, Start start)
+    : path_(without_trailing_slashes(std::move(path))), existing_(existing) {
+  check_target(path_, existing_);
+  if (start == Start::kResume) folder_ = folder_to_resume(path_);
+  if (folder_.empty()) {
+    folder_ = path_ + kPartMark + unique_suffix();
+    make_folder(folder_);
+  }
+  lock_ = open_folder(folder_);
+  if (!try_lock(lock_))
+    throw Error(
+        ErrorCode::kResource,
+        fmt::format("'{}': another process is building here; wait for it or stop it", folder_));
+}
+
+SceneWriter::~SceneWriter() {
+  std::error_code ignored;
+  if (!keep_ && !folder_.empty()) fs::remove_all(folder_, ignored);
+}
+
+std::string SceneWriter::path_for(const std::string& name) const {
+  const std::string path = folder_ + "/" + name;
+  std::error_code failure;
+  fs::create_directories(folder_of(path), failure);
+  if (failure) throw_write_error(folder_of(path), failure.value());
+  return path;
+}
+
+StoredFile SceneWriter::record(const std::string& name, const std::string& kind) const {
+  const FileDigest digest = digest_of_file(folder_ + "/" + name);
+  return {name, kind, digest.size, digest.checksum};
+}
+
+void SceneWriter::finish(const SceneDescription& description) {
+  if (const auto wrong = check_description(description))
+    throw Error(ErrorCode::kUsage, fmt::format("'{}': {}", path_, *wrong));
+  for (const SceneTile& tile : description.tiles) {
+    for (const StoredFile& file : tile.files) check_listed(file, folder_);
+  }
+  for (const StoredFile& file : description.layers) check_listed(file, folder_);
+  const std::string text = scene_to_json(description);
+  write_file(folder_ + "/" + kSceneJson, std::as_bytes(std::span(text)), Existing::kReplace);
+  flush_folders(folder_);
+  check_target(path_, existing_);
+  const int reason = rename_to_new(folder_, path_);
+  if (reason != 0 && (reason != EEXIST || existing_ == Existing::kRefuse))
+    reason == EEXIST ? throw_exists(path_) : throw_write_error(path_, reason);
+  std::string old;
+  if (reason == EEXIST) old = swap_in(folder_, path_);
+  folder_.clear();
+  flush_folder(folder_of(path_));
+  std::error_code ignored;
+  if (!old.empty()) fs::remove_all(old, ignored);
+}
+
+}  // namespace scarp
