@@ -116,7 +116,7 @@ void add_verify(CLI::App& app, VerifyOptions& o, std::function<int()>& run) {
   c->callback([&] { run = [&o] { return run_verify(o); }; });
 }
 
-void add_preview(CLI::App& app, PreviewOptions& o, std::function<int()>& run) {
+void add_preview(CLI::App& app, PreviewCommandOptions& o, std::function<int()>& run) {
   CLI::App* c = app.add_subcommand("preview", "Draw a scene as a picture");
   c->footer(
       "Examples:\n  scarp preview alps.scene -o alps.png\n"
@@ -165,7 +165,7 @@ int run_command_line(int argc, char** argv) {
   BuildOptions build;
   CullOptions cull;
   VerifyOptions verify;
-  PreviewOptions preview;
+  PreviewCommandOptions preview;
   CheckOptions check;
   std::function<int()> run;
   add_build(app, build, run);

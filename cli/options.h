@@ -64,7 +64,7 @@ struct VerifyOptions {
   std::uint64_t seed = 1;
 };
 
-struct PreviewOptions {
+struct PreviewCommandOptions {
   CommonOptions common;
   std::string scene;
   std::string output;

@@ -4,6 +4,7 @@
 #include <proj.h>
 
 #include <GeographicLib/Geocentric.hpp>
+#include <GeographicLib/Geodesic.hpp>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -252,6 +253,26 @@ MapPoint GeoFrame::Placer::unplace(const Position& p) const {
     x += turn * std::round((description.centre_x - x) / turn);
   }
   return {x, at.xy.y, height_m};
+}
+
+double GeoFrame::Placer::plane_direction_rad(const MapPoint& from, double azimuth_deg) const {
+  const GeoFrame& frame = *impl_->frame;
+  if (frame.description_.earth == Earth::kFlat) return (90 - azimuth_deg) / kDegreesPerRadian;
+  // The geodesic's tangent as a chord of a kilometre: the lattice turns it by less than 1e-6.
+  constexpr double kChordM = 1000;
+  const Datum& datum = *frame.datum_;
+  const GeodeticPoint at = impl_->geodetic(from.x, from.y);
+  const GeographicLib::Geodesic earth(datum.semi_major_m, datum.flattening);
+  const auto place_at = [&](double distance_m) {
+    double latitude_deg, longitude_deg;
+    earth.Direct(at.latitude_deg, at.longitude_deg, azimuth_deg, distance_m, latitude_deg,
+                 longitude_deg);
+    EcefPoint ecef;
+    datum.ecef.Forward(latitude_deg, longitude_deg, from.height_m, ecef.x_m, ecef.y_m, ecef.z_m);
+    return datum.frame->flatten(ecef);
+  };
+  const Position behind = place_at(-kChordM / 2), ahead = place_at(kChordM / 2);
+  return std::atan2(ahead.y_m - behind.y_m, ahead.x_m - behind.x_m);
 }
 
 MapPoint convert_coordinates(const std::string& from_crs, const std::string& to_crs,

@@ -72,6 +72,10 @@ class GeoFrame {
     /// Requires an ellipsoidal frame.
     GeodeticPoint geodetic(double x, double y) const;
 
+    /// Direction in the flattened plane, radians counter-clockwise from +x, in which an azimuth
+    /// leaves a point: degrees clockwise from true north, from grid north in a flat frame.
+    double plane_direction_rad(const MapPoint& from, double azimuth_deg) const;
+
    private:
     struct Impl;
     std::unique_ptr<Impl> impl_;

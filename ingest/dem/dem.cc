@@ -209,12 +209,12 @@ class HeightReader {
     std::vector<std::uint8_t> mask(width * kRowsPerRead, 255);
     const std::unique_ptr<XXH3_state_t, XXH_errorcode (*)(XXH3_state_t*)> hash(XXH3_createState(),
                                                                                XXH3_freeState);
-    XXH3_64bits_reset(hash.get());
+    XXH3_128bits_reset(hash.get());
     for (int row = 0; row < source_.rows; row += kRowsPerRead) {
       const int count = std::min(kRowsPerRead, source_.rows - row);
       read_rows(row, count, values, mask);
-      XXH3_64bits_update(hash.get(), values.data(),
-                         width * static_cast<std::size_t>(count) * sizeof(double));
+      XXH3_128bits_update(hash.get(), values.data(),
+                          width * static_cast<std::size_t>(count) * sizeof(double));
       for (int r = 0; r < count; ++r) {
         const int file_row = row + r;
         const int up_row = source_.south_up ? source_.rows - 1 - file_row : file_row;
@@ -231,7 +231,8 @@ class HeightReader {
       }
       if (progress) progress(static_cast<double>(row + count) / source_.rows);
     }
-    checksum = fmt::format("{:016x}", XXH3_64bits_digest(hash.get()));
+    const XXH128_hash_t digest = XXH3_128bits_digest(hash.get());
+    checksum = fmt::format("{:016x}{:016x}", digest.high64, digest.low64);
     return known;
   }
 
@@ -365,7 +366,11 @@ Dem read_dem(const std::vector<std::string>& files, const DemOptions& options,
   for (std::size_t i = 0; i < sources.size(); ++i) {
     const Source& source = sources[i];
     HeightReader reader(source, options, frame.earth == Earth::kEllipsoid);
-    DemSource described{std::filesystem::path(source.file).filename().string(), 0, ""};
+    DemSource described;
+    described.name = std::filesystem::path(source.file).filename().string();
+    VSIStatBufL status;
+    if (VSIStatL(source.file.c_str(), &status) == 0)
+      described.size_bytes = static_cast<std::uint64_t>(status.st_size);
     described.samples = reader.read_into(
         dem,
         [&](double done) {

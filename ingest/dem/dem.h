@@ -30,8 +30,9 @@ inline constexpr double kBytesPerSample = 160;
 /// A file that heights were taken from.
 struct DemSource {
   std::string name;  ///< without folder
-  std::uint64_t samples = 0;
-  std::string checksum;  ///< xxh3-64 of the heights as read, hexadecimal
+  std::uint64_t size_bytes = 0;
+  std::uint64_t samples = 0;  ///< that are known
+  std::string checksum;       ///< XXH3-128 of the values as read (double), hexadecimal
 };
 
 /// A north-up raster of heights in metres, its place on the map, and the frame that places it.

@@ -34,7 +34,7 @@ std::unique_ptr<OGRMultiPolygon> geometry_of(const GroupPolygon& group) {
       auto line = std::make_unique<OGRLinearRing>();
       line->setNumPoints(static_cast<int>(ring.size()) + 1);
       for (std::size_t i = 0; i <= ring.size(); ++i) {
-        const MapPoint& point = ring[i < ring.size() ? i : 0];
+        const RingPoint& point = ring[i < ring.size() ? i : 0];
         line->setPoint(static_cast<int>(i), point.x, point.y);
       }
       polygon->addRingDirectly(line.release());

@@ -10,13 +10,13 @@
 namespace scarp {
 
 /// A point of a map, in units of its CRS: x east or longitude, y north or latitude.
-struct MapPoint {
+struct RingPoint {
   double x;
   double y;
 };
 
 /// Corners of a closed ring in order; the first is not repeated.
-using Ring = std::vector<MapPoint>;
+using Ring = std::vector<RingPoint>;
 
 /// A group as a feature. trace_groups gives its rings as vertices.
 struct GroupPolygon {

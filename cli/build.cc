@@ -1,0 +1,262 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "cli/build/layers.h"
+#include "cli/build/report.h"
+#include "cli/commands.h"
+#include "cli/loaded_scene.h"
+#include "cli/picture_size.h"
+#include "cli/progress_bar.h"
+#include "cli/stage_clock.h"
+#include "core/culling/visible_groups.h"
+#include "core/error/error.h"
+#include "core/horizon/stewart.h"
+#include "core/occlusion/build_groups.h"
+#include "core/raster/preview.h"
+#include "ingest/dem/dem.h"
+#include "ingest/mesh/mesh.h"
+#include "tiles/layers/png_image.h"
+#include "tiles/store/groups_file.h"
+#include "tiles/store/horizon_file.h"
+#include "tiles/store/scene.h"
+#include "tiles/store/tin_file.h"
+
+namespace scarp {
+namespace {
+
+constexpr char kTile[] = "0/0/0";
+
+/// One build from options to a finished scene, a member function a stage.
+class Build {
+ public:
+  explicit Build(const BuildOptions& options)
+      : options_(options),
+        bar_(!options.common.json),
+        writer_(options.scene, options.common.overwrite ? Existing::kReplace : Existing::kRefuse) {
+    tile_.id = kTile;
+  }
+
+  void run() {
+    stage("read", [&](const Progress& p) { read(p); });
+    stage("place", [&](const Progress&) { grid_ = place_samples(dem_); });
+    stage("mesh", [&](const Progress& p) { mesh(p); });
+    stage("horizons", [&](const Progress& p) { horizons(p); });
+    stage("groups", [&](const Progress& p) { groups(p); });
+    stage("layers", [&](const Progress& p) { layers(p); });
+    stage("preview", [&](const Progress&) { preview(); });
+    finish();
+    bar_.clear();
+  }
+
+  const nlohmann::json& report() const { return report_; }
+
+ private:
+  template <class Body>
+  void stage(const std::string& name, Body body) {
+    const Progress progress = bar_.stage(name);
+    clock_.begin(name);
+    body(progress);
+    clock_.end();
+  }
+
+  void read(const Progress& progress) {
+    DemOptions dem = options_.dem;
+    dem.memory_budget_bytes = options_.common.memory_budget_bytes;
+    dem_ = read_dem(options_.dem_files, dem, progress);
+  }
+
+  void mesh(const Progress& progress) {
+    if (options_.vertices)
+      mesh_options_.vertex_budget = options_.vertices;
+    else
+      mesh_options_.max_error_m = options_.max_error_m.value_or(
+          kDefaultErrorCells * std::min(grid_.cell_x_m, grid_.cell_y_m));
+    mesh_ = mesh_samples(grid_, mesh_options_, progress);
+    index_.emplace(mesh_.tin);
+    heights_m_ = vertex_heights_m(mesh_.tin, *dem_.frame);
+    write_tin(writer_.path_for(tile_file_name(kTile, "tin")), mesh_.tin, mesh_.sample_of_vertex,
+              Existing::kRefuse);
+    tile_.files.push_back(writer_.record(tile_file_name(kTile, "tin"), "tin"));
+  }
+
+  void horizons(const Progress& progress) {
+    const SectorLayout layout{options_.sectors, options_.subsectors};
+    horizon_ = stewart_horizons(mesh_.tin.vertices, layout, progress);
+    write_horizon(writer_.path_for(tile_file_name(kTile, "horizon")), horizon_, Existing::kRefuse);
+    tile_.files.push_back(writer_.record(tile_file_name(kTile, "horizon"), "horizon"));
+  }
+
+  void groups(const Progress& progress) {
+    CrystalOptions crystals;
+    crystals.seed = options_.seed;
+    crystals.group_triangles = static_cast<std::uint32_t>(options_.group_triangles);
+    crystals.seeds = options_.seeds.value_or(0);
+    crystals.min_group_triangles = options_.min_group_triangles;
+    if (options_.max_groups > 0) crystals.max_groups = options_.max_groups;
+    groups_ = build_groups(mesh_.tin, horizon_, crystals, progress, &grouping_);
+    write_groups(writer_.path_for(tile_file_name(kTile, "groups")), groups_, Existing::kRefuse);
+    tile_.files.push_back(writer_.record(tile_file_name(kTile, "groups"), "groups"));
+  }
+
+  /// Where the eye of the viewshed layer stands: as typed, or over the highest sample.
+  void choose_observer() {
+    if (options_.observer) {
+      observer_ = resolve(*options_.observer, options_.crs, *dem_.frame, *index_);
+    } else {
+      const auto highest = static_cast<std::size_t>(
+          std::max_element(heights_m_.begin(), heights_m_.end()) - heights_m_.begin());
+      observer_ = GeoFrame::Placer(*dem_.frame).unplace(mesh_.tin.vertices[highest]);
+      observer_.height_m += TypedPosition{}.height_m;
+    }
+    eye_ = GeoFrame::Placer(*dem_.frame).place(observer_);
+  }
+
+  void layers(const Progress& progress) {
+    choose_observer();
+    const std::vector<TriangleIndex> triangles = triangle_of_samples(grid_, *index_);
+    const std::vector<std::int32_t> group_values = group_of_samples(triangles, groups_);
+    RasterLayer groups = layer_over(dem_, std::span(group_values), "group");
+    groups.nodata = kVoidGroupValue;
+    groups.metadata["ORPHAN"] = std::to_string(kOrphanValue);
+    add_layer("layers/groups.tif", "cog",
+              [&](const std::string& path) { write_geotiff_cog(path, groups, Existing::kRefuse); });
+
+    const std::vector<std::uint8_t> seen =
+        viewshed_of_samples(grid_, triangles, *index_, eye_, progress);
+    RasterLayer viewshed = layer_over(dem_, std::span(seen), "visible");
+    viewshed.nodata = kUnknownValue;
+    viewshed.colours = {{{70, 80, 96, 255}, {250, 196, 60, 255}}};
+    viewshed.metadata["SURFACE"] = "tin";
+    viewshed.metadata["OBSERVER"] =
+        fmt::format("{:.10g},{:.10g},{:.3f}asl", observer_.x, observer_.y, observer_.height_m);
+    viewshed.metadata["TARGET_HEIGHT_M"] = "0";
+    viewshed.metadata["REFRACTION"] = fmt::format("{:g}", options_.dem.refraction);
+    viewshed.metadata["EARTH"] = is_flat() ? "flat" : "ellipsoid";
+    viewshed.metadata["VALUES"] = "1 visible, 0 hidden, 255 unknown";
+    add_layer("layers/viewshed.tif", "cog", [&](const std::string& path) {
+      write_geotiff_cog(path, viewshed, Existing::kRefuse);
+    });
+
+    add_layer("layers/groups.gpkg", "gpkg", [&](const std::string& path) {
+      write_group_polygons(path, group_polygons(mesh_.tin, groups_, heights_m_, *dem_.frame),
+                           dem_.frame->description().crs_wkt, Existing::kRefuse);
+    });
+  }
+
+  void preview() {
+    PreviewOptions options;
+    options.heights_m = heights_m_;
+    const Bounds bounds = bounds_of(mesh_.tin.vertices);
+    fit_to(bounds, options);
+    const Picture above = preview_from_above(mesh_.tin, groups_, options);
+    add_layer("preview.png", "png", [&](const std::string& path) {
+      write_png(path, above.width_px, above.height_px, above.rgb, Existing::kRefuse);
+    });
+    options.height_px = options.width_px * 9 / 16;
+    const View view = default_view(mesh_.tin.vertices, options.width_px, options.height_px);
+    const Picture tilted = preview_3d(mesh_.tin, groups_, view, options);
+    add_layer("preview-3d.png", "png", [&](const std::string& path) {
+      write_png(path, tilted.width_px, tilted.height_px, tilted.rgb, Existing::kRefuse);
+    });
+  }
+
+  void finish() {
+    report_ = build_report(options_, dem_, mesh_, mesh_options_, groups_, grouping_, observer_,
+                           clock_.costs());
+    const std::string text = report_.dump(2) + "\n";
+    add_layer("report.json", "json", [&](const std::string& path) {
+      write_file(path, std::as_bytes(std::span(text)), Existing::kRefuse);
+    });
+    const FrameDescription& frame = dem_.frame->description();
+    SceneDescription scene;
+    scene.made_by = "scarp " SCARP_VERSION;
+    scene.crs_wkt = frame.crs_wkt;
+    scene.earth.shape = is_flat() ? EarthShape::kFlat : EarthShape::kEllipsoid;
+    scene.earth.refraction = frame.refraction;
+    scene.earth.geoid = frame.geoid_file;
+    scene.earth.centre = {frame.centre_x, frame.centre_y, 0};
+    scene.raster = {dem_.columns, dem_.rows, dem_.geotransform};
+    scene.parameters = {{"sectors", std::int64_t{options_.sectors}},
+                        {"subsectors", std::int64_t{options_.subsectors}},
+                        {"horizon", std::string("stewart")},
+                        {"group_triangles", std::int64_t{options_.group_triangles}},
+                        {"min_group_triangles", std::int64_t{options_.min_group_triangles}},
+                        {"seed", static_cast<std::int64_t>(options_.seed)}};
+    if (mesh_options_.max_error_m) scene.parameters["max_error_m"] = *mesh_options_.max_error_m;
+    if (mesh_options_.vertex_budget)
+      scene.parameters["vertices"] = std::int64_t{*mesh_options_.vertex_budget};
+    for (const DemSource& source : dem_.sources)
+      scene.sources.push_back(
+          {source.name, source.size_bytes, checksum_from_hex(source.checksum).value()});
+    scene.tiles.push_back(tile_);
+    scene.layers = layers_;
+    writer_.finish(scene);
+  }
+
+  template <class Write>
+  void add_layer(const std::string& name, const std::string& kind, Write write) {
+    write(writer_.path_for(name));
+    layers_.push_back(writer_.record(name, kind));
+  }
+
+  bool is_flat() const { return dem_.frame->description().earth == Earth::kFlat; }
+
+  const BuildOptions& options_;
+  ProgressBar bar_;
+  SceneWriter writer_;
+  StageClock clock_;
+  SceneTile tile_;
+  std::vector<StoredFile> layers_;
+  Dem dem_;
+  SampleGrid grid_;
+  MeshOptions mesh_options_;
+  Mesh mesh_;
+  std::optional<TinIndex> index_;
+  std::vector<double> heights_m_;
+  HorizonTable horizon_;
+  Groups groups_;
+  GroupingReport grouping_;
+  MapPoint observer_;
+  Position eye_;
+  nlohmann::json report_;
+};
+
+void print_summary(const BuildOptions& options, const nlohmann::json& report) {
+  const auto& mesh = report["mesh"];
+  const auto& groups = report["groups"];
+  double seconds = 0;
+  std::uint64_t peak_bytes = 0;
+  for (const auto& stage : report["stages"]) {
+    seconds += stage["seconds"].get<double>();
+    peak_bytes = std::max(peak_bytes, stage["peak_memory_bytes"].get<std::uint64_t>());
+  }
+  for (const auto& warning : report["warnings"])
+    fmt::print(stderr, "scarp: warning: {}\n", warning.get<std::string>());
+  fmt::print("{}: {} x {} samples, {} vertices, {} triangles, error {:.3f} m\n", options.scene,
+             report["raster"]["columns"].get<int>(), report["raster"]["rows"].get<int>(),
+             mesh["vertices"].get<std::uint64_t>(), mesh["triangles"].get<std::uint64_t>(),
+             mesh["error_over_surface_m"].get<double>());
+  fmt::print("{} groups, {} orphans; {:.1f} s, {:.0f} MiB\n", groups["groups"].get<std::uint64_t>(),
+             groups["orphans"].get<std::uint64_t>(), seconds,
+             static_cast<double>(peak_bytes) / 0x1p20);
+}
+
+}  // namespace
+
+int run_build(const BuildOptions& options) {
+  if (options.max_error_m && !(*options.max_error_m >= 0 && *options.max_error_m < kLatticeReachM))
+    throw Error(
+        ErrorCode::kUsage,
+        fmt::format("--max-error {}: metres, zero or more, were expected", *options.max_error_m));
+  Build build(options);
+  build.run();
+  if (options.common.json)
+    fmt::print("{}\n", build.report().dump(2));
+  else
+    print_summary(options, build.report());
+  return 0;
+}
+
+}  // namespace scarp

@@ -1,0 +1,148 @@
+#include "cli/build/layers.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "core/sight/line_of_sight.h"
+#include "core/threads/parallel_for.h"
+#include "tiles/layers/outline.h"
+
+namespace scarp {
+namespace {
+
+/// How far inwards a border sample outside the mesh looks for it, in cells: more than
+/// kBorderDeviationCells lets it lie outside, less than would matter on a map.
+constexpr double kInwardsCells = 1.0 / 8;
+
+TriangleIndex triangle_near(const SampleGrid& grid, const TinIndex& index, const Position& p) {
+  const TriangleIndex at = index.triangle_at(p.x_m, p.y_m);
+  if (at != kNone || grid.bend_cells == 0) return at;
+  for (const double dy : {-kInwardsCells, kInwardsCells}) {
+    for (const double dx : {-kInwardsCells, kInwardsCells}) {
+      const TriangleIndex near = index.triangle_at(round_to_lattice(p.x_m + dx * grid.cell_x_m),
+                                                   round_to_lattice(p.y_m + dy * grid.cell_y_m));
+      if (near != kNone) return near;
+    }
+  }
+  return kNone;
+}
+
+/// The sample's place on the TIN, at or just above its ground.
+Position on_ground(const TinIndex& index, const Position& sample) {
+  Position p = sample;
+  const auto ground_m = index.ground_height_m(p.x_m, p.y_m);
+  if (!ground_m) return p;
+  p.z_m = std::ceil(*ground_m / kLatticeStepM) * kLatticeStepM;
+  if (index.above_ground(p).value_or(0) < 0) p.z_m += kLatticeStepM;
+  return p;
+}
+
+double plan_area_m2(const Tin& tin, TriangleIndex t) {
+  const auto& [a, b, c] = tin.triangles[t];
+  const Position &p = tin.vertices[a], &q = tin.vertices[b], &r = tin.vertices[c];
+  return ((q.x_m - p.x_m) * (r.y_m - p.y_m) - (q.y_m - p.y_m) * (r.x_m - p.x_m)) / 2;
+}
+
+}  // namespace
+
+std::vector<TriangleIndex> triangle_of_samples(const SampleGrid& grid, const TinIndex& index) {
+  std::vector<TriangleIndex> triangles(grid.positions.size(), kNone);
+  parallel_for(static_cast<std::size_t>(grid.rows), [&](std::size_t row) {
+    const auto columns = static_cast<std::size_t>(grid.columns);
+    for (std::size_t i = row * columns; i < (row + 1) * columns; ++i)
+      if (grid.known[i]) triangles[i] = triangle_near(grid, index, grid.positions[i]);
+  });
+  return triangles;
+}
+
+std::vector<std::int32_t> group_of_samples(const std::vector<TriangleIndex>& triangle_of_sample,
+                                           const Groups& groups) {
+  std::vector<std::int32_t> values(triangle_of_sample.size(), kVoidGroupValue);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const TriangleIndex triangle = triangle_of_sample[i];
+    if (triangle == kNone) continue;
+    const GroupIndex group = groups.group_of_triangle[triangle];
+    values[i] = group == kNone ? kOrphanValue : static_cast<std::int32_t>(group);
+  }
+  return values;
+}
+
+std::vector<std::uint8_t> viewshed_of_samples(const SampleGrid& grid,
+                                              const std::vector<TriangleIndex>& triangle_of_sample,
+                                              const TinIndex& index, const Position& eye,
+                                              const Progress& progress) {
+  std::vector<std::uint8_t> values(grid.positions.size(), kUnknownValue);
+  const auto columns = static_cast<std::size_t>(grid.columns);
+  // Rows in slices, so that progress is told from one thread.
+  constexpr std::size_t kSlices = 50;
+  const auto rows = static_cast<std::size_t>(grid.rows);
+  for (std::size_t slice = 0; slice < kSlices; ++slice) {
+    const std::size_t first = rows * slice / kSlices, last = rows * (slice + 1) / kSlices;
+    parallel_for(last - first, [&](std::size_t offset) {
+      const std::size_t start = (first + offset) * columns;
+      for (std::size_t i = start; i < start + columns; ++i) {
+        if (triangle_of_sample[i] == kNone) continue;
+        const Sight sight = line_of_sight(index, eye, on_ground(index, grid.positions[i]));
+        values[i] = sight == Sight::kVisible  ? kVisibleValue
+                    : sight == Sight::kHidden ? kHiddenValue
+                                              : kUnknownValue;
+      }
+    });
+    if (progress) progress(static_cast<double>(slice + 1) / kSlices);
+  }
+  return values;
+}
+
+std::vector<GroupPolygon> group_polygons(const Tin& tin, const Groups& groups,
+                                         const std::vector<double>& heights_m,
+                                         const GeoFrame& frame) {
+  std::vector<GroupPolygon> polygons(groups.leaf_count);
+  for (GroupIndex group = 0; group < groups.leaf_count; ++group) {
+    GroupPolygon& polygon = polygons[group];
+    polygon.group = group;
+    const GroupIndex parent = groups.nodes[group].parent;
+    polygon.parent = parent == kNone ? -1 : static_cast<std::int64_t>(parent);
+    polygon.height_min_m = std::numeric_limits<double>::infinity();
+    polygon.height_max_m = -polygon.height_min_m;
+  }
+  for (TriangleIndex t = 0; t < tin.triangles.size(); ++t) {
+    const GroupIndex group = groups.group_of_triangle[t];
+    if (group == kNone) continue;
+    GroupPolygon& polygon = polygons[group];
+    ++polygon.triangles;
+    polygon.area_m2 += plan_area_m2(tin, t);
+    for (const VertexIndex v : tin.triangles[t]) {
+      polygon.height_min_m = std::min(polygon.height_min_m, heights_m[v]);
+      polygon.height_max_m = std::max(polygon.height_max_m, heights_m[v]);
+    }
+  }
+  const GeoFrame::Placer placer(frame);
+  for (const GroupOutline& outline : trace_groups(tin, groups.group_of_triangle)) {
+    for (const VertexPolygon& polygon : outline.polygons) {
+      std::vector<Ring> rings;
+      for (const VertexRing& vertices : polygon) {
+        Ring& ring = rings.emplace_back();
+        for (const VertexIndex v : vertices) {
+          const MapPoint at = placer.unplace(tin.vertices[v]);
+          ring.push_back({at.x, at.y});
+        }
+      }
+      polygons[outline.group].polygons.push_back(std::move(rings));
+    }
+  }
+  return polygons;
+}
+
+RasterLayer layer_over(const Dem& dem, LayerSamples samples, const std::string& band_name) {
+  RasterLayer layer;
+  layer.columns = dem.columns;
+  layer.rows = dem.rows;
+  layer.samples = samples;
+  layer.geotransform = dem.geotransform;
+  layer.crs_wkt = dem.frame->description().crs_wkt;
+  layer.band_name = band_name;
+  return layer;
+}
+
+}  // namespace scarp

@@ -1,0 +1,94 @@
+#include "cli/loaded_scene.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "core/error/error.h"
+#include "core/threads/parallel_for.h"
+#include "tiles/store/groups_file.h"
+#include "tiles/store/tin_file.h"
+
+namespace scarp {
+namespace {
+
+constexpr char kOnlyTile[] = "0/0/0";
+
+}  // namespace
+
+FrameDescription frame_of(const SceneDescription& description) {
+  FrameDescription frame;
+  frame.crs_wkt = description.crs_wkt;
+  frame.earth = description.earth.shape == EarthShape::kFlat ? Earth::kFlat : Earth::kEllipsoid;
+  frame.refraction = description.earth.refraction;
+  frame.geoid_file = description.earth.geoid;
+  frame.centre_x = description.earth.centre[0];
+  frame.centre_y = description.earth.centre[1];
+  return frame;
+}
+
+LoadedScene::LoadedScene(const std::string& path)
+    : scene(open_scene(path)),
+      tin(read_tin(scene.open(scene.require(kOnlyTile, "tin")))),
+      groups(read_groups(scene.open(scene.require(kOnlyTile, "groups")))),
+      frame(frame_of(scene.description())),
+      index(tin) {
+  if (groups.group_of_triangle.size() != tin.triangles.size())
+    throw Error(
+        ErrorCode::kCorrupt,
+        fmt::format("'{}': groups of {} triangles for a mesh of {}; files of one scene were "
+                    "expected; build it again",
+                    path, groups.group_of_triangle.size(), tin.triangles.size()));
+}
+
+std::optional<double> ground_height_m(const GeoFrame::Placer& placer, const TinIndex& index,
+                                      double x, double y) {
+  // Away from the scene's centre the normal leans a little against the frame's vertical, so the
+  // place in the plane depends on the height: each round leaves less than a thousandth of the lean.
+  double height_m = 0;
+  for (int round = 0; round < 3; ++round) {
+    Position p = placer.place({x, y, height_m});
+    const auto ground_m = index.ground_height_m(p.x_m, p.y_m);
+    if (!ground_m) return {};
+    p.z_m = *ground_m;
+    height_m = placer.unplace(p).height_m;
+  }
+  return height_m;
+}
+
+MapPoint resolve(const TypedPosition& typed, const std::string& crs, const GeoFrame& frame,
+                 const TinIndex& index) {
+  MapPoint point{typed.x, typed.y, typed.height_m};
+  if (!crs.empty()) {
+    if (frame.description().crs_wkt.empty())
+      throw Error(ErrorCode::kInput,
+                  fmt::format("--crs {}: the data have no coordinate system to convert to; give "
+                              "positions in the units of the data and leave --crs out",
+                              crs));
+    point = convert_coordinates(crs, frame.description().crs_wkt, point);
+  }
+  if (typed.above_datum) return point;
+  const auto ground_m = ground_height_m(GeoFrame::Placer(frame), index, point.x, point.y);
+  if (!ground_m)
+    throw Error(ErrorCode::kInput,
+                fmt::format("position '{}': no ground is known there; a place on the data was "
+                            "expected; check the order X,Y and --crs, or give an absolute height "
+                            "such as {:g},{:g},1200asl",
+                            typed.text, typed.x, typed.y));
+  point.height_m += *ground_m;
+  return point;
+}
+
+std::vector<double> vertex_heights_m(const Tin& tin, const GeoFrame& frame) {
+  std::vector<double> heights_m(tin.vertices.size());
+  constexpr std::size_t kBlock = 4096;
+  parallel_for((heights_m.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
+    const GeoFrame::Placer placer(frame);
+    const std::size_t end = std::min((block + 1) * kBlock, heights_m.size());
+    for (std::size_t v = block * kBlock; v < end; ++v)
+      heights_m[v] = placer.unplace(tin.vertices[v]).height_m;
+  });
+  return heights_m;
+}
+
+}  // namespace scarp

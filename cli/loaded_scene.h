@@ -1,0 +1,44 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "cli/options.h"
+#include "core/occlusion/groups.h"
+#include "core/sight/tin_index.h"
+#include "core/terrain/tin.h"
+#include "ingest/crs/geo_frame.h"
+#include "tiles/store/scene.h"
+
+namespace scarp {
+
+/// A scene in memory, with all that commands ask of it.
+struct LoadedScene {
+  explicit LoadedScene(const std::string& path);
+
+  Scene scene;
+  Tin tin;
+  Groups groups;
+  GeoFrame frame;
+  TinIndex index;
+};
+
+/// The frame that a scene was built in.
+FrameDescription frame_of(const SceneDescription& description);
+
+/// What a typed position means in map coordinates of the scene: converted from `crs` where that is
+/// given, its height above the datum of the data.
+///
+/// Throws Error{kInput} where a height above ground is asked for and there is no ground.
+MapPoint resolve(const TypedPosition& typed, const std::string& crs, const GeoFrame& frame,
+                 const TinIndex& index);
+
+/// Height of the ground at a map point, metres above the datum of the data, or nothing over void.
+std::optional<double> ground_height_m(const GeoFrame::Placer& placer, const TinIndex& index,
+                                      double x, double y);
+
+/// Height of each vertex above the datum of the data.
+std::vector<double> vertex_heights_m(const Tin& tin, const GeoFrame& frame);
+
+}  // namespace scarp
