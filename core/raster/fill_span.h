@@ -26,9 +26,12 @@ inline void fill_span_depth(const Span& span, std::size_t count, float* depth) {
 inline void fill_span(const Span& span, std::size_t count, float* depth, std::uint32_t* object) {
   for (std::size_t i = 0; i < count; ++i) {
     const float z = span.depth + span.depth_step * static_cast<float>(static_cast<int>(i));
-    const bool nearer = z > depth[i] || (z == depth[i] && span.object < object[i]);
-    depth[i] = nearer ? z : depth[i];
-    object[i] = nearer ? span.object : object[i];
+    const float there = depth[i];
+    const std::uint32_t owner = object[i];
+    // Without short cuts, so that the compiler may take several pixels at a time.
+    const bool nearer = (z > there) | ((z == there) & (span.object < owner));
+    depth[i] = nearer ? z : there;
+    object[i] = nearer ? span.object : owner;
   }
 }
 

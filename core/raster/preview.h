@@ -38,7 +38,7 @@ struct PreviewOptions {
 /// outside is kBackground. Void groups: an empty group_of_triangle.
 ///
 /// Requires (asserted): neighbours connected; spans empty or of the sizes above; sizes positive.
-/// Cost: O(triangles + pixels); memory 32 bytes a pixel and about 80 bytes a vertex.
+/// Cost: O(triangles + pixels); memory 32 bytes a pixel and about 110 bytes a vertex.
 Picture preview_from_above(const Tin& tin, const Groups& groups, const PreviewOptions& options);
 
 /// The same from a camera, as a block of ground with cut sides under a hazy sky. Culled triangles
