@@ -1,0 +1,318 @@
+#include <gdal_priv.h>
+#include <gtest/gtest.h>
+#include <ogrsf_frmts.h>
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "tests/support/run_scarp.h"
+#include "tests/support/temp_folder.h"
+
+namespace scarp {
+namespace {
+
+using nlohmann::json;
+using test::run_scarp;
+using test::RunResult;
+
+json read_json(const std::string& path) {
+  return json::parse(std::ifstream(path));
+}
+
+std::set<std::string> listing(const std::filesystem::path& folder) {
+  std::set<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    names.insert(entry.path().filename().string());
+  return names;
+}
+
+/// One scene of the Jacksboro fault for all tests that only read it.
+class BuiltScene : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    GDALAllRegister();
+    folder_ = new test::TempFolder;
+    dem_ = test::jacksboro_vrt(folder_->folder().string());
+    if (dem_.empty()) return;
+    scene_ = folder_->path("a.scene");
+    built_ = run_scarp("$SCARP build " + dem_ + " -o " + scene_ + " --max-error 25 --json");
+  }
+  static void TearDownTestSuite() { delete folder_; }
+
+  void SetUp() override {
+    if (dem_.empty()) GTEST_SKIP() << "left out, python-matplotlib-data is not installed";
+    ASSERT_EQ(built_.exit_code, 0) << built_.errors;
+  }
+
+  static inline test::TempFolder* folder_ = nullptr;
+  static inline std::string dem_, scene_;
+  static inline RunResult built_;
+};
+
+TEST_F(BuiltScene, ReportTellsWhatWasDone) {
+  const json report = read_json(scene_ + "/report.json");
+  EXPECT_EQ(report, json::parse(built_.output));
+  EXPECT_EQ(report["inputs"][0]["name"], "jacksboro.vrt");
+  EXPECT_EQ(report["raster"]["known_samples"], 403 * 344);
+  EXPECT_GT(report["mesh"]["vertices"], 1000);
+  EXPECT_LE(report["mesh"]["error_over_surface_m"], 25);
+  EXPECT_GT(report["groups"]["groups"], 10);
+  std::set<std::string> stages;
+  for (const json& stage : report["stages"]) {
+    stages.insert(stage["name"]);
+    EXPECT_GE(stage["seconds"], 0);
+    EXPECT_GT(stage["peak_memory_bytes"], 1 << 20);
+  }
+  EXPECT_EQ(stages, (std::set<std::string>{"read", "place", "mesh", "horizons", "groups", "layers",
+                                           "preview"}));
+  EXPECT_TRUE(report["versions"].contains("gdal"));
+}
+
+TEST_F(BuiltScene, LayersOpenInGdalAndAgreeWithEachOther) {
+  GDALDataset* groups = GDALDataset::Open((scene_ + "/layers/groups.tif").c_str());
+  ASSERT_NE(groups, nullptr);
+  EXPECT_STREQ(groups->GetMetadataItem("LAYOUT", "IMAGE_STRUCTURE"), "COG");
+  EXPECT_EQ(groups->GetRasterBand(1)->GetRasterDataType(), GDT_Int32);
+  EXPECT_STREQ(groups->GetSpatialRef()->GetAuthorityCode(nullptr), "4326");
+  double transform[6];
+  groups->GetGeoTransform(transform);
+  EXPECT_DOUBLE_EQ(transform[0], -84.41375);
+  std::vector<std::int32_t> values(403 * 344);
+  ASSERT_EQ(groups->GetRasterBand(1)->RasterIO(GF_Read, 0, 0, 403, 344, values.data(), 403, 344,
+                                               GDT_Int32, 0, 0),
+            CE_None);
+  GDALClose(groups);
+  const json report = read_json(scene_ + "/report.json");
+  const std::int32_t count = report["groups"]["groups"];
+  std::map<std::int32_t, int> samples_of;
+  for (const std::int32_t value : values) {
+    ASSERT_GE(value, -1);  // no void in this DEM: every sample has a triangle
+    ASSERT_LT(value, count);
+    ++samples_of[value];
+  }
+
+  GDALDataset* polygons =
+      GDALDataset::Open((scene_ + "/layers/groups.gpkg").c_str(), GDAL_OF_VECTOR);
+  ASSERT_NE(polygons, nullptr);
+  OGRLayer* layer = polygons->GetLayerByName("groups");
+  EXPECT_EQ(layer->GetFeatureCount(), count);
+  std::int64_t triangles = 0;
+  int inside = 0, outside = 0;
+  for (auto& feature : layer) {
+    triangles += feature->GetFieldAsInteger64("triangles");
+    EXPECT_LT(feature->GetFieldAsDouble("height_min_m"), feature->GetFieldAsDouble("height_max_m"));
+    ASSERT_TRUE(feature->GetGeometryRef()->IsValid());
+    // A sample that the raster gives to this group lies in the polygon, but for borders.
+    const auto group = static_cast<std::int32_t>(feature->GetFieldAsInteger64("group"));
+    for (std::size_t i = 0; i < values.size(); i += 997) {
+      if (values[i] != group) continue;
+      OGRPoint at(transform[0] + (static_cast<double>(i % 403) + 0.5) * transform[1],
+                  transform[3] + (static_cast<double>(i / 403) + 0.5) * transform[5]);
+      ++(feature->GetGeometryRef()->Distance(&at) < 0.05 * transform[1] ? inside : outside);
+    }
+  }
+  GDALClose(polygons);
+  EXPECT_GT(inside, 50);
+  EXPECT_EQ(outside, 0);
+  EXPECT_EQ(triangles + report["groups"]["orphans"].get<std::int64_t>(),
+            report["mesh"]["triangles"].get<std::int64_t>());
+}
+
+TEST_F(BuiltScene, ViewshedOfTheHighestPointSeesItself) {
+  GDALDataset* viewshed = GDALDataset::Open((scene_ + "/layers/viewshed.tif").c_str());
+  ASSERT_NE(viewshed, nullptr);
+  std::vector<std::uint8_t> values(403 * 344);
+  ASSERT_EQ(viewshed->GetRasterBand(1)->RasterIO(GF_Read, 0, 0, 403, 344, values.data(), 403, 344,
+                                                 GDT_Byte, 0, 0),
+            CE_None);
+  const std::string observer = viewshed->GetMetadataItem("OBSERVER");
+  double transform[6];
+  viewshed->GetGeoTransform(transform);
+  GDALClose(viewshed);
+  const double x = std::stod(observer), y = std::stod(observer.substr(observer.find(',') + 1));
+  const auto column = static_cast<std::size_t>((x - transform[0]) / transform[1]);
+  const auto row = static_cast<std::size_t>((y - transform[3]) / transform[5]);
+  EXPECT_EQ(values[row * 403 + column], 1);
+  const auto visible = std::count(values.begin(), values.end(), 1);
+  EXPECT_GT(visible, 1000);
+  EXPECT_GT(std::count(values.begin(), values.end(), 0), visible);
+}
+
+TEST_F(BuiltScene, SameBitsForAnyThreadCount) {
+  const json once = read_json(scene_ + "/scene.json");
+  for (const char* threads : {"1", "5"}) {
+    const std::string other = folder_->path(std::string("threads") + threads);
+    ASSERT_EQ(
+        run_scarp("$SCARP build " + dem_ + " -o " + other + " --max-error 25 --threads " + threads)
+            .exit_code,
+        0);
+    const json again = read_json(other + "/scene.json");
+    EXPECT_EQ(again["tiles"], once["tiles"]);
+    for (const json& layer : again["layers"])
+      if (layer["name"] != "report.json") {
+        EXPECT_NE(std::find(once["layers"].begin(), once["layers"].end(), layer),
+                  once["layers"].end())
+            << layer["name"];
+      }
+  }
+}
+
+TEST_F(BuiltScene, VerifyCountsAddUp) {
+  const RunResult run =
+      run_scarp("$SCARP verify " + scene_ + " --eyes 2 --heights 2,1000 --seed 7 --json");
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  const json counts = json::parse(run.output);
+  const std::uint64_t triangles = read_json(scene_ + "/report.json")["mesh"]["triangles"];
+  ASSERT_EQ(counts.size(), 2U);
+  for (const json& c : counts) {
+    EXPECT_EQ(c["method"], "thesis");
+    EXPECT_EQ(c["eyes"], 2);
+    EXPECT_EQ(c["triangles"], 2 * triangles);
+    EXPECT_LE(c["in_hidden_groups"], c["hidden"]);
+    EXPECT_LE(c["falsely_culled"], c["culled"]);
+    EXPECT_LE(c["culled"].get<std::uint64_t>(),
+              c["in_hidden_groups"].get<std::uint64_t>() +
+                  // a group with one false triangle may hold many that are hidden
+                  (c["falsely_culled"] == 0 ? 0 : c["hidden"].get<std::uint64_t>()));
+    EXPECT_GT(c["hidden"], 0);
+  }
+  EXPECT_GT(counts[0]["hidden"], counts[1]["hidden"]);  // from higher up more is seen
+  EXPECT_EQ(
+      run_scarp("$SCARP verify " + scene_ + " --eyes 2 --heights 2,1000 --seed 7 --json").output,
+      run.output);
+}
+
+TEST_F(BuiltScene, CullAnswersInBothCrsSpellingsAndWithAView) {
+  const std::string at = " --camera=-84.2,36.6,50";
+  const json all = json::parse(run_scarp("$SCARP cull " + scene_ + at + " --json").output);
+  const json named =
+      json::parse(run_scarp("$SCARP cull " + scene_ + at + " --crs OGC:CRS84 --json").output);
+  EXPECT_EQ(all["visible_groups"], named["visible_groups"]);
+  EXPECT_EQ(all["drawn"].get<int>() + all["culled"].get<int>(), all["triangles"].get<int>());
+  const json narrow = json::parse(
+      run_scarp("$SCARP cull " + scene_ + at + " --azimuth 350 --field-of-view 40 --json").output);
+  EXPECT_LT(narrow["visible_groups"].size(), all["visible_groups"].size());
+  EXPECT_GT(narrow["visible_groups"].size(), 0U);
+  const std::set<int> every = all["visible_groups"].get<std::set<int>>();
+  for (const int group : narrow["visible_groups"]) EXPECT_TRUE(every.count(group));
+}
+
+TEST_F(BuiltScene, PreviewDrawsPicturesOfTheAskedWidth) {
+  for (const std::string option : {"", "--3d", "--observer=-84.2,36.6,300",
+                                   "--camera=-84.2,36.4,4000asl --target=-84.2,36.6"}) {
+    const std::string picture = folder_->path("p.png");
+    const RunResult run = run_scarp("$SCARP preview " + scene_ + " -o " + picture +
+                                    " --width 300 --overwrite " + option);
+    ASSERT_EQ(run.exit_code, 0) << run.errors;
+    GDALDataset* image = GDALDataset::Open(picture.c_str());
+    ASSERT_NE(image, nullptr) << option;
+    EXPECT_EQ(std::max(image->GetRasterXSize(), image->GetRasterYSize()), 300);
+    EXPECT_EQ(image->GetRasterCount(), 3);
+    GDALClose(image);
+  }
+}
+
+TEST_F(BuiltScene, CheckFindsAFlippedBitInAnyFile) {
+  EXPECT_EQ(run_scarp("$SCARP check " + scene_).exit_code, 0);
+  const std::string copy = folder_->path("damaged");
+  for (const char* file : {"tiles/0/0/0.tin", "tiles/0/0/0.horizon", "tiles/0/0/0.groups",
+                           "layers/groups.tif", "layers/viewshed.tif", "layers/groups.gpkg",
+                           "preview.png", "preview-3d.png", "report.json", "scene.json"}) {
+    std::filesystem::remove_all(copy);
+    std::filesystem::copy(scene_, copy, std::filesystem::copy_options::recursive);
+    const std::string path = copy + "/" + file;
+    std::fstream stream(path, std::ios::in | std::ios::out | std::ios::binary);
+    const auto middle = static_cast<std::streamoff>(std::filesystem::file_size(path) / 2);
+    stream.seekg(middle);
+    const int byte = stream.get();
+    stream.seekp(middle);
+    stream.put(static_cast<char>(byte ^ 1));
+    stream.close();
+    const RunResult run = run_scarp("$SCARP check " + copy);
+    EXPECT_EQ(run.exit_code, 1) << file;
+    EXPECT_NE(run.output.find(std::filesystem::path(file).filename()), std::string::npos)
+        << run.output;
+  }
+}
+
+TEST_F(BuiltScene, RefusalsAreOneLineAndLeaveNothingBehind) {
+  std::ofstream(folder_->path("notes.txt")) << "hello";
+  std::filesystem::create_directories(folder_->path("plain folder"));
+  std::ofstream(folder_->path("plain folder") + "/keep.txt") << "mine";
+  const std::string dem = dem_, f = folder_->folder().string();
+  struct Refusal {
+    std::string arguments;
+    int exit_code;
+    std::string says;
+  };
+  const Refusal refusals[] = {
+      {"build " + f + "/missing.tif -o " + f + "/x", 1, "no such file"},
+      {"build " + f + "/notes.txt -o " + f + "/x", 1, "a raster that GDAL reads was expected"},
+      {"build " + dem + " -o " + scene_, 1, "--overwrite"},
+      {"build " + dem + " -o '" + f + "/plain folder' --overwrite", 1, "plain folder"},
+      {"build " + dem + " -o " + f + "/nowhere/x", 1, "nowhere"},
+      {"build " + dem + " -o " + f + "/x --earth flat", 1, "is in degrees"},
+      {"build " + dem + " -o " + f + "/x --refraction 2", 1, "outside [0, 1]"},
+      {"build " + dem + " -o " + f + "/x --height-unit fm", 1, "--height-unit fm"},
+      {"build " + dem + " -o " + f + "/x --geoid " + f + "/none.gtx", 1, "no such file"},
+      {"build " + dem + " -o " + f + "/x --observer 0,0", 1, "no ground is known there"},
+      {"build " + dem + " -o " + f + "/x --observer nowhere", 2, "not understood"},
+      {"build " + dem + " -o " + f + "/x --memory 1M", 1, "--memory"},
+      {"build " + dem + " -o " + f + "/x --memory lots", 2, "not understood"},
+      {"build " + dem + " -o " + f + "/x --max-error 1 --vertices 9", 2, "excludes"},
+      {"build " + dem + " -o " + f + "/x --max-error -1", 2, "--max-error"},
+      {"build " + dem + " -o " + f + "/x --sectors 3", 2, "--sectors"},
+      {"build", 2, "--help"},
+      {"frobnicate", 2, "--help"},
+      {"cull " + f + "/missing --camera 0,0", 1, "missing"},
+      {"cull " + scene_ + " --camera 0,0", 1, "no ground is known there"},
+      {"cull " + scene_ + " --camera 0,0,2 --crs EPSG:1", 1, "EPSG:1"},
+      {"verify " + dem, 1, "jacksboro.vrt"},
+      {"preview " + scene_ + " -o " + f + "/nowhere/p.png", 1, "nowhere"},
+  };
+  const std::set<std::string> before = listing(folder_->folder());
+  for (const Refusal& refusal : refusals) {
+    const RunResult run = run_scarp("$SCARP " + refusal.arguments);
+    EXPECT_EQ(run.exit_code, refusal.exit_code) << refusal.arguments << "\n" << run.errors;
+    EXPECT_NE(run.errors.find(refusal.says), std::string::npos) << run.errors;
+    EXPECT_EQ(std::count(run.errors.begin(), run.errors.end(), '\n'), 1) << run.errors;
+    EXPECT_EQ(run.output, "") << refusal.arguments;
+    EXPECT_EQ(listing(folder_->folder()), before) << refusal.arguments;
+  }
+}
+
+TEST_F(BuiltScene, FullDiskIsOneLineAndLeavesNothingBehind) {
+  // A limit on file sizes fails writes as a full disk does.
+  const std::set<std::string> before = listing(folder_->folder());
+  const RunResult run = run_scarp("trap '' XFSZ; ulimit -f 40; $SCARP build " + dem_ + " -o " +
+                                  folder_->path("x") + " --max-error 25");
+  EXPECT_EQ(run.exit_code, 1) << run.errors;
+  EXPECT_EQ(std::count(run.errors.begin(), run.errors.end(), '\n'), 1) << run.errors;
+  EXPECT_EQ(listing(folder_->folder()), before);
+}
+
+TEST_F(BuiltScene, OverwriteReplacesTheScene) {
+  const std::string other = folder_->path("b.scene");
+  ASSERT_EQ(run_scarp("$SCARP build " + dem_ + " -o " + other + " --max-error 200").exit_code, 0);
+  ASSERT_EQ(
+      run_scarp("$SCARP build " + dem_ + " -o " + other + " --vertices 500 --overwrite").exit_code,
+      0);
+  EXPECT_EQ(read_json(other + "/report.json")["mesh"]["vertices"], 500);
+  EXPECT_EQ(run_scarp("$SCARP check " + other).exit_code, 0);
+}
+
+TEST(CommandLine, HelpAndVersion) {
+  EXPECT_EQ(run_scarp("$SCARP --version").output, "scarp " SCARP_VERSION "\n");
+  for (const char* command : {"build", "cull", "verify", "preview", "check"}) {
+    const RunResult help = run_scarp(std::string("$SCARP ") + command + " --help");
+    EXPECT_EQ(help.exit_code, 0);
+    EXPECT_NE(help.output.find("Example"), std::string::npos) << command;
+    EXPECT_NE(help.output.find("--threads"), std::string::npos) << command;
+  }
+}
+
+}  // namespace
+}  // namespace scarp
