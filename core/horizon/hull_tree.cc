@@ -1,14 +1,11 @@
 #include "core/horizon/hull_tree.h"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
-#include <limits>
 
 namespace scarp {
 namespace {
-
-/// Left of every point, so that a search for greater u passes over what is not there.
-constexpr std::int64_t kNotInserted = std::numeric_limits<std::int64_t>::min() / 2;
 
 /// Room that a hull starts with: most never need more.
 constexpr std::uint32_t kFirstCapacity = 8;
@@ -26,9 +23,10 @@ bool strictly_above(const PlanePoint& p, const PlanePoint& r, const PlanePoint& 
 void look_at(const PlanePoint& q, std::int64_t u, std::int64_t z, Steepest& best) {
   const Slope slope{q.z - z, q.u - u};
   if (best.vertex != kNone) {
-    const int sign = compare_slopes(slope, best.slope);
-    if (sign < 0) return;
-    if (sign == 0 &&
+    const __int128 left = static_cast<__int128>(slope.rise) * best.slope.run;
+    const __int128 right = static_cast<__int128>(best.slope.rise) * slope.run;
+    if (left < right) return;
+    if (left == right &&
         (slope.run > best.slope.run || (slope.run == best.slope.run && q.vertex > best.vertex)))
       return;
   }
@@ -37,9 +35,10 @@ void look_at(const PlanePoint& q, std::int64_t u, std::int64_t z, Steepest& best
 
 }  // namespace
 
-void HullTree::reset(std::size_t ranks) {
-  const std::size_t blocks = (ranks + kBlock - 1) / kBlock;
-  by_rank_.assign(ranks, PlanePoint{kNotInserted, 0, kNone});
+void HullTree::reset(std::span<const PlanePoint> by_rank) {
+  const std::size_t blocks = (by_rank.size() + kBlock - 1) / kBlock;
+  by_rank_ = by_rank;
+  inserted_.assign(blocks, 0);
   hulls_.assign(blocks + 1, Hull{});
   arena_.resize(blocks * kFirstCapacity);
   for (std::size_t i = 1; i <= blocks; ++i) {
@@ -48,12 +47,12 @@ void HullTree::reset(std::size_t ranks) {
   }
 }
 
-void HullTree::insert(std::size_t rank, const PlanePoint& point) {
-  assert(rank < by_rank_.size() && by_rank_[rank].u == kNotInserted);
-  by_rank_[rank] = point;
+void HullTree::insert(std::size_t rank) {
+  assert(rank < by_rank_.size() && !is_inserted(rank));
+  inserted_[rank / kBlock] |= BlockMask{1} << (rank % kBlock);
   // Each hull on the way covers the one before it: what lies under one lies under all that follow.
   for (std::size_t i = rank / kBlock + 1; i < hulls_.size(); i += lowest_bit(i))
-    if (!insert_in_hull(hulls_[i], point)) return;
+    if (!insert_in_hull(hulls_[i], by_rank_[rank])) return;
 }
 
 /// @return whether the point is now on the hull; false where it lies on or under it already.
@@ -107,7 +106,6 @@ Steepest HullTree::steepest(std::size_t end, std::int64_t u, std::int64_t z) con
   assert(end <= by_rank_.size());
   Steepest best;
   const std::size_t block = end / kBlock;
-  look_at_ranks(block * kBlock, end, u, z, best);
   for (std::size_t i = block; i > 0; i -= lowest_bit(i)) {
     const Hull& hull = hulls_[i];
     if (hull.size == 0) continue;
@@ -115,9 +113,10 @@ Steepest HullTree::steepest(std::size_t end, std::int64_t u, std::int64_t z) con
       look_at_hull(hull, u, z, best);
     } else {
       // A point that is not to the right may have taken others off the hull that are wanted.
-      look_at_ranks((i - lowest_bit(i)) * kBlock, i * kBlock, u, z, best);
+      for (std::size_t k = i - lowest_bit(i); k < i; ++k) look_at_block(k, kBlock, u, z, best);
     }
   }
+  look_at_block(block, end % kBlock, u, z, best);
   return best;
 }
 
@@ -142,10 +141,16 @@ void HullTree::look_at_hull(const Hull& hull, std::int64_t u, std::int64_t z,
   look_at(points[low], u, z, best);
 }
 
-void HullTree::look_at_ranks(std::size_t begin, std::size_t end, std::int64_t u, std::int64_t z,
+/// Looks at the inserted ones of the first `count` ranks of a block.
+void HullTree::look_at_block(std::size_t block, std::size_t count, std::int64_t u, std::int64_t z,
                              Steepest& best) const {
-  for (std::size_t rank = begin; rank < end; ++rank)
-    if (by_rank_[rank].u > u) look_at(by_rank_[rank], u, z, best);
+  if (count == 0) return;
+  const PlanePoint* points = by_rank_.data() + block * kBlock;
+  BlockMask left = inserted_[block] & (~BlockMask{0} >> (kBlock - count));
+  for (; left != 0; left &= left - 1) {
+    const PlanePoint& q = points[std::countr_zero(left)];
+    if (q.u > u) look_at(q, u, z, best);
+  }
 }
 
 std::optional<std::string> HullTree::check() const {
@@ -173,8 +178,8 @@ std::optional<std::string> HullTree::check_hull(const Hull& hull, std::size_t be
       return "wrong bounds";
   }
   for (std::size_t rank = begin; rank < end; ++rank) {
+    if (!is_inserted(rank)) continue;
     const PlanePoint& q = by_rank_[rank];
-    if (q.u == kNotInserted) continue;
     const auto next = std::partition_point(points.begin(), points.end(),
                                            [&](const PlanePoint& h) { return h.u < q.u; });
     if (next == points.end() || (next->u != q.u && next == points.begin()))

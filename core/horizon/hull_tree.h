@@ -33,13 +33,14 @@ struct Steepest {
 /// memory. Source: Edmondson 2004, section 4.5.3 and figure 9.
 class HullTree {
  public:
-  static constexpr std::size_t kBlock = 32;
+  static constexpr std::size_t kBlock = 64;
 
-  /// Forgets all points and makes room for `ranks` of them. Memory is kept for the next use.
-  void reset(std::size_t ranks);
+  /// Begins anew over points by rank, none of them inserted. Memory is kept for the next use.
+  /// The points are not copied: they must stay where they are while the tree is used.
+  void reset(std::span<const PlanePoint> by_rank);
 
-  /// Adds the point of one rank. Requires rank < ranks, each inserted once.
-  void insert(std::size_t rank, const PlanePoint& point);
+  /// Adds the point of one rank. Requires a rank of the points, each inserted once.
+  void insert(std::size_t rank);
 
   /// Steepest inserted point with rank < end as seen from (u, z), counting only points of greater
   /// u; of equally steep ones the nearest, then the lowest vertex.
@@ -51,6 +52,9 @@ class HullTree {
   std::optional<std::string> check() const;
 
  private:
+  using BlockMask = std::uint64_t;
+  static_assert(kBlock == 8 * sizeof(BlockMask));
+
   /// Upper hull of a node's points: arena_[first, first + size), by rising u.
   struct Hull {
     std::size_t first = 0;
@@ -62,13 +66,17 @@ class HullTree {
   bool insert_in_hull(Hull& hull, const PlanePoint& point);
   void replace(Hull& hull, std::size_t from, std::size_t to, const PlanePoint& point);
   void look_at_hull(const Hull& hull, std::int64_t u, std::int64_t z, Steepest& best) const;
-  void look_at_ranks(std::size_t begin, std::size_t end, std::int64_t u, std::int64_t z,
+  void look_at_block(std::size_t block, std::size_t count, std::int64_t u, std::int64_t z,
                      Steepest& best) const;
+  bool is_inserted(std::size_t rank) const {
+    return (inserted_[rank / kBlock] >> (rank % kBlock) & 1) != 0;
+  }
   std::optional<std::string> check_hull(const Hull& hull, std::size_t begin, std::size_t end) const;
 
   std::vector<Hull> hulls_;        // [blocks + 1]; hull i covers blocks (i - lowest bit of i, i]
   std::vector<PlanePoint> arena_;  // room for hulls; a hull that outgrows its room moves to the end
-  std::vector<PlanePoint> by_rank_;  // [ranks], u = kNotInserted where there is none yet
+  std::span<const PlanePoint> by_rank_;
+  std::vector<BlockMask> inserted_;  // [blocks], a bit for each rank
 };
 
 }  // namespace scarp

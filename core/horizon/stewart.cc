@@ -121,11 +121,11 @@ void sweep(std::span<const Position> vertices, const Subsector& subsector, Works
            std::span<VertexIndex> horizon) {
   rank_along_b(vertices, subsector, w);
   order_along_a(w);
-  w.tree.reset(vertices.size());
+  w.tree.reset(w.points);
   for (const KeyedIndex& item : w.order) {
     const PlanePoint& p = w.points[item.index];
     horizon[p.vertex] = w.tree.steepest(w.tie_end[item.index], p.u, p.z).vertex;
-    w.tree.insert(item.index, p);
+    w.tree.insert(item.index);
   }
 }
 
