@@ -118,6 +118,7 @@ TEST(Crystals, DoNotGrowOverARidge) {
   const Scene scene = scene_of(31, 31, ridge_m);
   CrystalOptions options;
   options.min_group_triangles = 1;
+  options.seeds = 1;  // free to take everything
   for (options.seed = 0; options.seed < 5; ++options.seed) {
     const LeafGroups groups = grow_crystals(scene.tin, scene.horizon, options);
     // A quarter up either slope and below, away from the rows whose view of the ridge is cut off.
@@ -130,6 +131,8 @@ TEST(Crystals, DoNotGrowOverARidge) {
       if (p.x_m > 260) east[g] = true;
     }
     for (GroupIndex g = 0; g < groups.count; ++g) EXPECT_FALSE(west[g] && east[g]) << g;
+    EXPECT_GE(std::count(west.begin(), west.end(), true), 1);
+    EXPECT_GE(std::count(east.begin(), east.end(), true), 1);
   }
 }
 
@@ -162,12 +165,14 @@ TEST(Crystals, HorizonOfTheLowestVertexLimitsGrowth) {
   options.seeds = 1;
   options.max_passes = 1;
   options.min_group_triangles = 1;
-  for (options.seed = 0; options.seed < 20; ++options.seed) {
+  // The last triangle is in a group only where it is the seed: one in four times.
+  int without_the_last = 0;
+  for (options.seed = 0; options.seed < 40; ++options.seed) {
     const LeafGroups groups = grow_crystals(tin, horizon, options);
-    const bool seed_is_last = groups.group_of_triangle[3] != kNone;
-    if (seed_is_last) continue;  // it holds the hidden corner itself
-    EXPECT_EQ(groups.group_of_triangle, (std::vector<GroupIndex>{0, 0, 0, kNone}));
+    without_the_last += groups.group_of_triangle == std::vector<GroupIndex>{0, 0, 0, kNone} ? 1 : 0;
   }
+  EXPECT_GE(without_the_last, 24);
+  EXPECT_LT(without_the_last, 40);
 }
 
 TEST(Crystals, SettingsOfTheThesisCanBeAskedFor) {
