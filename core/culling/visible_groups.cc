@@ -32,9 +32,8 @@ AzimuthArc turned(const AzimuthArc& arc, double by_rad) {
 AzimuthArc towards_eye(const GroupNode& node, const Position& eye) {
   const double dx_m = eye.x_m - node.centre_x_m, dy_m = eye.y_m - node.centre_y_m;
   const double distance_m = std::sqrt(dx_m * dx_m + dy_m * dy_m);
-  if (!(distance_m > node.radius_m)) return kAllAround;
   const double sine = node.radius_m / distance_m * (1 + kRatioRounding);
-  if (sine >= 1) return kAllAround;
+  if (!(sine < 1)) return kAllAround;  // inside the circle, or 0 / 0
   const double middle_rad = std::atan2(dy_m, dx_m), half_rad = std::asin(sine);
   return {middle_rad - half_rad, middle_rad + half_rad};
 }

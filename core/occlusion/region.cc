@@ -77,8 +77,9 @@ void push_concave(std::vector<RegionPoint>& points, const RegionPoint& p) {
 
 RayRegion region_of_vertex(const Position& vertex, const Position& horizon,
                            const SectorAxis& axis) {
-  // Differences of lattice positions are exact. The horizon lies within pi / 4 of the axis, so
-  // that the sum cannot cancel to less than 0.7 of its terms' length.
+  // Differences of lattice positions are exact. The horizon lies within 51 degrees of the axis (45,
+  // and what the horizon's own rounding adds for the nearest), so that the sum cannot cancel to
+  // less than 0.6 of its terms' length.
   const double run_m = axis.x * (horizon.x_m - vertex.x_m) + axis.y * (horizon.y_m - vertex.y_m);
   assert(run_m > 0);
   const double slope = (horizon.z_m - vertex.z_m) / run_m;
