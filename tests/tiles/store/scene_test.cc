@@ -283,7 +283,7 @@ TEST(SceneWriter, AReaderSeesTheOldSceneOrTheNewOne) {
       }
     }
   });
-  for (int generation = 1; generation <= 25; ++generation)
+  for (int generation = 1; generation <= 12; ++generation)
     write_scene(path, Existing::kReplace, generation);
   stop = true;
   reader.join();
