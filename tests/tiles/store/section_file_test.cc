@@ -1,0 +1,296 @@
+#include "tiles/store/section_file.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "core/error/error.h"
+#include "tests/tiles/limits.h"
+#include "tests/tiles/reseal.h"
+#include "tests/tiles/small_scene.h"
+#include "tests/tiles/temporary_folder.h"
+#include "tiles/store/groups_file.h"
+#include "tiles/store/horizon_file.h"
+#include "tiles/store/tin_file.h"
+
+namespace scarp {
+namespace {
+
+using Bytes = std::vector<std::byte>;
+using test::TemporaryFolder;
+
+/// What kind of file it is, its bytes, and how it is read to the end.
+struct KindOfFile {
+  std::string name;
+  Bytes bytes;
+  std::function<void(const SectionFile&)> read;
+};
+
+std::vector<KindOfFile> kinds_of_file() {
+  const Tin tin = test::grid_tin(3, 3);
+  const std::vector<std::int64_t> samples = {0, 1, 2, 3, -1, 5, 6, 7, 8};
+  return {
+      {"tin", tin_writer(tin, samples).to_bytes(),
+       [](const SectionFile& file) {
+         // what is read without complaint can be walked: the sanitizers look on
+         Tin read = read_tin(file);
+         (void)check_tin(read);
+         (void)read_sample_of_vertex(file);
+       }},
+      {"horizon", horizon_writer(test::small_horizons(tin)).to_bytes(),
+       [](const SectionFile& file) { read_horizon(file); }},
+      {"groups", groups_writer(test::small_groups(tin)).to_bytes(), [](const SectionFile& file) {
+         const Groups groups = read_groups(file);
+         for (GroupIndex n = 0; n < groups.nodes.size(); ++n) {
+           for (std::int32_t s = 0; s < groups.regions.layout.count; ++s) {
+             const RegionView region = groups.regions.at(n, s);
+             double sum = 0;
+             for (std::uint32_t i = 0; i < region.count; ++i) sum += region.points[i].u_m;
+             EXPECT_EQ(sum, sum);
+           }
+         }
+       }}};
+}
+
+/// The message of the Error{kCorrupt} that reading gives, or "" where it gives none.
+std::string complaint(const Bytes& bytes, const std::function<void(const SectionFile&)>& read,
+                      Verify verify = Verify::kEverything) {
+  try {
+    read(SectionFile::from_memory(bytes, "f", verify));
+    return "";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kCorrupt) << error.what();
+    return error.what();
+  }
+}
+
+TEST(SectionFile, GivesBackWhatWasWritten) {
+  const TemporaryFolder folder;
+  const std::vector<double> x = {1.5, -2.25, 1e300};
+  const std::vector<std::uint8_t> few = {7};
+  const std::vector<std::int32_t> none;
+  const std::vector<float> pairs = {1, 2, 3, 4};
+  SectionFileWriter writer({'T', 'E', 'S', 'T'}, 3);
+  writer.add<std::uint8_t>("few", std::span(few));
+  writer.add<std::int32_t>("none", std::span(none));
+  writer.add<double>("x", std::span(x));
+  writer.add_rows<float>("pairs", std::span(pairs), 2);
+  writer.write(folder / "f", Existing::kRefuse);
+  const SectionFile file = SectionFile::open(folder / "f", Verify::kEverything);
+  file.require({'T', 'E', 'S', 'T'}, 3);
+  const auto back = file.section<double>("x");
+  EXPECT_TRUE(std::equal(back.begin(), back.end(), x.begin(), x.end()));
+  EXPECT_EQ(reinterpret_cast<std::uintptr_t>(back.data()) % 64, 0U);
+  EXPECT_EQ(file.section<std::uint8_t>("few")[0], 7);
+  EXPECT_TRUE(file.section<std::int32_t>("none").empty());
+  EXPECT_EQ(file.section<float>("pairs", 2).size(), 4U);
+  EXPECT_EQ(file.width("pairs"), 2U);
+  const std::string text = test::read_text(folder / "f");
+  const std::span<const std::byte> on_disk = std::as_bytes(std::span(text));
+  const Bytes in_memory = writer.to_bytes();
+  EXPECT_TRUE(std::equal(on_disk.begin(), on_disk.end(), in_memory.begin(), in_memory.end()));
+}
+
+TEST(SectionFile, SaysWhatIsWrong) {
+  const KindOfFile tin = kinds_of_file()[0];
+  const auto says = [&](const std::string& part,
+                        const std::function<void(const SectionFile&)>& use) {
+    const std::string text = complaint(tin.bytes, use);
+    EXPECT_NE(text.find(part), std::string::npos) << text;
+  };
+  says("'f': section \"nothing\" is missing",
+       [](const SectionFile& f) { f.section<double>("nothing"); });
+  says("section \"position\" holds float64 x 3 where float32 x 3 was expected",
+       [](const SectionFile& f) { f.section<float>("position", 3); });
+  says("section \"position\" holds float64 x 3 where float64 x 1 was expected",
+       [](const SectionFile& f) { f.section<double>("position"); });
+  says("kind \"TIN \" where \"GRPS\" was expected", [](const SectionFile& f) { read_groups(f); });
+  says("version 1 of kind \"TIN \" where 2 was expected",
+       [](const SectionFile& f) { f.require(kTinKind, 2); });
+}
+
+TEST(SectionFile, EveryTruncationIsAnError) {
+  for (const KindOfFile& kind : kinds_of_file()) {
+    for (std::size_t size = 0; size < kind.bytes.size(); ++size) {
+      const Bytes cut(kind.bytes.begin(), kind.bytes.begin() + static_cast<std::ptrdiff_t>(size));
+      EXPECT_NE(complaint(cut, kind.read, Verify::kStructure), "") << kind.name << " " << size;
+      Bytes sealed = cut;  // a size and checksums that fit must not help
+      test::reseal(sealed);
+      EXPECT_NE(complaint(sealed, kind.read), "") << kind.name << " " << size;
+    }
+    Bytes longer = kind.bytes;
+    longer.push_back(std::byte{0});
+    EXPECT_NE(complaint(longer, kind.read, Verify::kStructure), "");
+    test::reseal(longer);
+    EXPECT_NE(complaint(longer, kind.read), "");
+  }
+}
+
+TEST(SectionFile, EveryFlippedByteIsAnError) {
+  for (const KindOfFile& kind : kinds_of_file()) {
+    EXPECT_EQ(complaint(kind.bytes, kind.read), "");
+    for (std::size_t at = 0; at < kind.bytes.size(); ++at) {
+      for (const int mask : {0x01, 0x10, 0x80, 0xff}) {
+        Bytes flipped = kind.bytes;
+        flipped[at] ^= std::byte(mask);
+        EXPECT_NE(complaint(flipped, kind.read), "") << kind.name << " byte " << at;
+        // behind fitting checksums it may be read or refused, but never more
+        complaint(flipped, kind.read, Verify::kStructure);
+        test::reseal(flipped);
+        complaint(flipped, kind.read);
+      }
+    }
+  }
+}
+
+TEST(SectionFile, HeadIsCheckedWithoutReadingTheArrays) {
+  const KindOfFile tin = kinds_of_file()[0];
+  const std::size_t head_size = 64 + 4 * 64;
+  for (std::size_t at = 0; at < head_size; ++at) {
+    Bytes flipped = tin.bytes;
+    flipped[at] ^= std::byte{0x40};
+    EXPECT_NE(complaint(
+                  flipped, [](const SectionFile&) {}, Verify::kStructure),
+              "")
+        << at;
+  }
+}
+
+TEST(SectionFile, MissingFilesAreTheCallersInput) {
+  const TemporaryFolder folder;
+  try {
+    SectionFile::open(folder / "none");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kInput);
+  }
+  test::write_text(folder / "empty", "");
+  try {
+    SectionFile::open(folder / "empty");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
+  }
+}
+
+TEST(SectionFile, FullDiskLeavesNothingBehind) {
+  const TemporaryFolder folder;
+  const Tin tin = test::grid_tin(100, 100);
+  {
+    const test::FullDisk full(100'000);
+    EXPECT_THROW(write_tin(folder / "t", tin, {}, Existing::kRefuse), Error);
+  }
+  EXPECT_TRUE(folder.names().empty());
+  write_tin(folder / "t", tin, {}, Existing::kRefuse);
+  EXPECT_EQ(read_tin(SectionFile::open(folder / "t")).vertices, tin.vertices);
+}
+
+TEST(TinFile, RoundTrip) {
+  const TemporaryFolder folder;
+  const Tin tin = test::grid_tin(7, 5);
+  std::vector<std::int64_t> samples(tin.vertices.size(), -1);
+  samples[3] = 1'000'000'000'000;
+  write_tin(folder / "t", tin, samples, Existing::kRefuse);
+  const SectionFile file = SectionFile::open(folder / "t", Verify::kEverything);
+  const Tin back = read_tin(file);
+  EXPECT_EQ(back.vertices, tin.vertices);
+  EXPECT_EQ(back.triangles, tin.triangles);
+  EXPECT_EQ(back.neighbours, tin.neighbours);
+  EXPECT_EQ(read_sample_of_vertex(file), samples);
+  EXPECT_TRUE(
+      read_sample_of_vertex(SectionFile::from_memory(tin_writer(tin).to_bytes(), "f")).empty());
+  EXPECT_THROW(write_tin(folder / "t", tin, {}, Existing::kRefuse), Error);
+}
+
+TEST(TinFile, EmptyTin) {
+  const Bytes bytes = tin_writer(Tin{}).to_bytes();
+  EXPECT_TRUE(read_tin(SectionFile::from_memory(bytes, "f")).vertices.empty());
+}
+
+TEST(TinFile, RefusesWhatCannotBeWalked) {
+  const auto complains = [](const std::string& part, const std::function<void(Tin&)>& damage) {
+    Tin tin = test::grid_tin(3, 3);
+    damage(tin);
+    const std::string text = complaint(tin_writer(tin).to_bytes(), read_tin);
+    EXPECT_NE(text.find(part), std::string::npos) << part << " | " << text;
+  };
+  complains("triangle 1 has vertex 9 of 9", [](Tin& t) { t.triangles[1][2] = 9; });
+  complains("triangle 0 is not counter-clockwise",
+            [](Tin& t) { std::swap(t.triangles[0][0], t.triangles[0][1]); });
+  complains("vertex 4 is not on the lattice", [](Tin& t) { t.vertices[4].y_m = 0.1; });
+  complains("vertex 5 is not on the lattice",
+            [](Tin& t) { t.vertices[5].z_m = std::numeric_limits<double>::quiet_NaN(); });
+  complains("vertex 6 is not on the lattice", [](Tin& t) { t.vertices[6].x_m = 0x1p28; });
+  complains("wrong neighbour", [](Tin& t) { t.neighbours[0][0] = 8; });
+  complains("wrong neighbour", [](Tin& t) { t.neighbours[0][0] = 3; });
+  complains("wrong neighbour", [](Tin& t) { t.neighbours[1] = {kNone, kNone, kNone}; });
+}
+
+TEST(HorizonFile, RoundTrip) {
+  const HorizonTable table = test::small_horizons(test::grid_tin(4, 4));
+  const Bytes bytes = horizon_writer(table).to_bytes();
+  const HorizonTable back = read_horizon(SectionFile::from_memory(bytes, "f"));
+  EXPECT_EQ(back.layout, table.layout);
+  EXPECT_EQ(back.horizon_vertex, table.horizon_vertex);
+}
+
+TEST(HorizonFile, RefusesVerticesThatDoNotExist) {
+  HorizonTable table = test::small_horizons(test::grid_tin(3, 3));
+  table.horizon_vertex[6] = 9;
+  EXPECT_NE(complaint(horizon_writer(table).to_bytes(), read_horizon)
+                .find("vertex 1 has its horizon at vertex 9 of 9"),
+            std::string::npos);
+}
+
+TEST(GroupsFile, RoundTrip) {
+  const Groups groups = test::small_groups(test::grid_tin(4, 3));
+  const Bytes bytes = groups_writer(groups).to_bytes();
+  const Groups back = read_groups(SectionFile::from_memory(bytes, "f"));
+  EXPECT_EQ(back.group_of_triangle, groups.group_of_triangle);
+  EXPECT_EQ(back.leaf_count, groups.leaf_count);
+  EXPECT_EQ(back.regions.layout, groups.regions.layout);
+  EXPECT_EQ(back.regions.first, groups.regions.first);
+  EXPECT_EQ(back.regions.end_slope, groups.regions.end_slope);
+  ASSERT_EQ(back.regions.points.size(), groups.regions.points.size());
+  EXPECT_EQ(back.regions.points.back().u_m, groups.regions.points.back().u_m);
+  ASSERT_EQ(back.nodes.size(), 3U);
+  EXPECT_EQ(back.nodes[2].children, groups.nodes[2].children);
+  EXPECT_EQ(back.nodes[1].radius_m, 8.5);
+  EXPECT_EQ(groups_writer(back).to_bytes(), bytes);
+  EXPECT_TRUE(
+      read_groups(SectionFile::from_memory(groups_writer(Groups{}).to_bytes(), "f")).nodes.empty());
+}
+
+TEST(GroupsFile, RefusesWhatCannotBeWalked) {
+  const auto complains = [](const std::string& part, const std::function<void(Groups&)>& damage) {
+    Groups groups = test::small_groups(test::grid_tin(3, 3));
+    damage(groups);
+    const std::string text = complaint(groups_writer(groups).to_bytes(), read_groups);
+    EXPECT_NE(text.find(part), std::string::npos) << part << " | " << text;
+  };
+  complains("4 leaves in a tree of 3", [](Groups& g) { g.leaf_count = 4; });
+  complains("triangle 0 is in group 2 of 2", [](Groups& g) { g.group_of_triangle[0] = 2; });
+  complains("node 2 has node 2 as a child", [](Groups& g) {
+    g.nodes[2].children[1] = 2;
+    g.nodes[1].parent = kNone;
+  });
+  complains("node 2 has one child twice", [](Groups& g) {
+    g.nodes[2].children[1] = 0;
+    g.nodes[1].parent = kNone;
+  });
+  complains("node 0 has node 1 as a child", [](Groups& g) { g.nodes[0].children[0] = 1; });
+  complains("node 0 has node 1 as its parent", [](Groups& g) { g.nodes[0].parent = 1; });
+  complains("node 2 does not name its child 0", [](Groups& g) {
+    g.leaf_count = 2;
+    g.nodes[2].children = {1, 1};
+  });
+  complains("node 2 has node 7 as its parent", [](Groups& g) { g.nodes[2].parent = 7; });
+  complains("no proper circle", [](Groups& g) { g.nodes[1].radius_m = -1; });
+  complains("region 3 begins before", [](Groups& g) { g.regions.first[3] = 0; });
+  complains("region points where", [](Groups& g) { g.regions.points.pop_back(); });
+  complains("is not a number",
+            [](Groups& g) { g.regions.points[0].z_m = std::numeric_limits<double>::quiet_NaN(); });
+}
+
+}  // namespace
+}  // namespace scarp
