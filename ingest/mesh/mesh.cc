@@ -37,7 +37,7 @@ using FaceBase = CGAL::Constrained_triangulation_face_base_2<
     PlaneTraits, CGAL::Triangulation_face_base_with_info_2<FaceInfo, PlaneTraits>>;
 using Triangulation = CGAL::Constrained_Delaunay_triangulation_2<
     PlaneTraits, CGAL::Triangulation_data_structure_2<VertexBase, FaceBase>,
-    CGAL::No_constraint_intersection_tag>;
+    CGAL::No_constraint_intersection_requiring_constructions_tag>;
 using Face = Triangulation::Face_handle;
 using Vertex = Triangulation::Vertex_handle;
 using Point = PlaneTraits::Point_2;
