@@ -184,8 +184,9 @@ class GreedyMesher {
 
   // The result.
   void measure_all_edges();
-  void tell(double done) const {
-    if (progress_) progress_(done);
+  void tell(double done) {
+    told_ = std::max(told_, done);
+    if (progress_) progress_(told_);
   }
   Mesh result();
   void copy_triangles(Mesh& mesh);
@@ -205,6 +206,7 @@ class GreedyMesher {
   double goal_m_ = 0;
   bool with_edges_ = false;  // crossings count, too
   std::uint32_t last_stamp_ = 0;
+  double told_ = 0;  // progress must not fall
 };
 
 GreedyMesher::GreedyMesher(const SampleGrid& grid, const MeshOptions& options,
@@ -500,7 +502,7 @@ std::optional<GridNode> GreedyMesher::shape_repair(Face f) const {
                  &o = position(corner(f, 2));
   const double area_m2 = (q.x_m - p.x_m) * (o.y_m - p.y_m) - (q.y_m - p.y_m) * (o.x_m - p.x_m);
   const double bend_m = bend_cells_over(longest_cells) * std::max(grid_.cell_x_m, grid_.cell_y_m);
-  constexpr double kLeastHeightInBends = 4;  // three corners can move, and one bend to spare
+  constexpr double kLeastHeightInBends = 1;  // four times what a chord strays, bend L^2 / 4
   if (area_m2 >= kLeastHeightInBends * bend_m * longest_m) return {};
 
   const GridNode &a = corner(f, cdt_.ccw(longest)), &b = corner(f, cdt_.cw(longest));
@@ -677,7 +679,9 @@ Mesh GreedyMesher::result() {
               std::to_string(grid_.bend_cells) +
               " cells over one cell; much less is wanted; resample the raster to finer cells");
     mesh.error_at_samples_m = std::max(mesh.error_at_samples_m, f->info().sample_error_m);
-    mesh.error_over_surface_m = std::max(mesh.error_over_surface_m, f->info().edge_error_m);
+    // A corner inserted across one of its edges since may have resolved the cell.
+    if (f->info().edge_error_m > mesh.error_over_surface_m)
+      mesh.error_over_surface_m = std::max(mesh.error_over_surface_m, worst_crossing(f).error_m);
   }
   mesh.error_over_surface_m = std::max(mesh.error_over_surface_m, mesh.error_at_samples_m);
   mesh.cell_ambiguity_m = cell_ambiguity_m();
@@ -694,7 +698,7 @@ Mesh GreedyMesher::run() {
             std::to_string(grid_.rows) +
             " samples has four known corners; at least one is wanted; check the nodata value");
   insert_border();
-  goal_m_ = options_.max_error_m.value_or(0.0);
+  goal_m_ = std::max(options_.max_error_m.value_or(0.0), kErrorRoundingM / 2);
   const std::uint32_t budget = options_.vertex_budget.value_or(kNone);
   for (const Face f : cdt_.finite_face_handles()) scan(f);
   insert_until(goal_m_, budget);

@@ -40,7 +40,8 @@ struct Mesh {
 /// How far a border edge may run from the samples between its ends, in cells (bent grids only).
 inline constexpr double kBorderDeviationCells = 1.0 / 32;
 
-/// Rounding of heights compared in double: measured errors are this exact, metres.
+/// Rounding of heights compared in double, metres: measured errors are this exact, and an error
+/// bound below half of it means half of it.
 inline constexpr double kErrorRoundingM = 1e-7;
 
 /// Greatest number of columns and of rows, so that all arithmetic in the sample plane is exact.
