@@ -21,11 +21,12 @@ enum class Sight {
 
 /// @return kUnknown for a line that nothing blocks when in plan some place of it over void lies
 ///         between two places of it over ground, or an end lies over void that ground encloses.
-///         So a line that reaches the ground from outside the data is not unknown.
+///         So a line that reaches the ground from outside the data is not unknown, nor is one that
+///         ends outside; a bay of void that is open to the outside counts as outside.
 ///
 /// Symmetric in a and b. Requires lattice positions.
 /// Cost: the bins along the line whose ground reaches up to it; for a line over c bins O(c).
-/// Source: VISIBILITY, section 1; the judge's own checks in tests/judge.
+/// Source: own; compared with CGAL's AABB tree and exact arithmetic in tests/judge.
 Sight line_of_sight(const TinIndex& index, const Position& a, const Position& b);
 
 /// Whether known ground blocks the line: line_of_sight(...) == kHidden, without the question of
