@@ -32,7 +32,7 @@ struct CrystalOptions {
 /// @return groups in the order of their seeds, at most max_groups, each connected by edges
 /// Requires tin.neighbours, and a horizon of all its vertices; group_triangles, max_passes > 0.
 /// The same bits on every machine: growth is sequential.
-/// Cost: O(triangles), some 0.3 us each. Source: Edmondson 2004, 5.2.3 and 6.3.1.
+/// Cost: O(triangles), under 1 us each. Source: Edmondson 2004, 5.2.3 and 6.3.1.
 LeafGroups grow_crystals(const Tin& tin, const HorizonTable& horizon, const CrystalOptions& options,
                          const Progress& progress = {});
 

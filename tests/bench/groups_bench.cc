@@ -1,8 +1,9 @@
 // How long grouping takes on a mesh of a real DEM, and how much the groups cull.
 //   groups_bench [--vertices N] [--threads N] [--layout COUNT/SUBSECTORS]
 // Prints a row for each layout with the settings of table 3 of Edmondson 2004 (100 seeds and at
-// most 200 groups a hundred cells of vertices), then crystals against squares of equal mean size:
-// triangles culled by 60 seeded eyes all around, as a share of all. Needs the shared data.
+// most 200 groups; 500 and 1,000 above 50,000 vertices), then crystals against squares of equal
+// mean size: triangles culled by 60 seeded eyes that look all around, as a share of all. Needs the
+// shared data.
 
 #include <fmt/core.h>
 #include <gdal_priv.h>
