@@ -55,7 +55,7 @@ void check_nodes(const Groups& groups, const SectionFile& file) {
     if (!is_leaf && node.children[0] == node.children[1])
       file.fail(fmt::format("node {} has one child twice", n));
     if (node.parent != kNone) {
-      if (node.parent <= n || node.parent >= count || node.parent < groups.leaf_count)
+      if (node.parent >= count || node.parent < groups.leaf_count)
         file.fail(fmt::format("node {} has node {} as its parent", n, node.parent));
       const auto& siblings = groups.nodes[node.parent].children;
       if (siblings[0] != n && siblings[1] != n)

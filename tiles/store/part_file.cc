@@ -52,6 +52,22 @@ int rename_to_new(const std::string& from, const std::string& to) {
   return ::rename(from.c_str(), to.c_str()) == 0 ? 0 : errno;
 }
 
+std::string replace_folder(const std::string& folder, const std::string& path) {
+  const std::string old = path + ".old-" + unique_suffix();
+  if (::renameat2(AT_FDCWD, folder.c_str(), AT_FDCWD, path.c_str(), RENAME_EXCHANGE) == 0) {
+    // from a name that kResume would take up to one that it would not
+    return ::rename(folder.c_str(), old.c_str()) == 0 ? old : folder;
+  }
+  if (errno != EINVAL && errno != ENOSYS) throw_write_error(path, errno);
+  if (::rename(path.c_str(), old.c_str()) != 0) throw_write_error(path, errno);
+  if (::rename(folder.c_str(), path.c_str()) != 0) {
+    const int reason = errno;
+    ::rename(old.c_str(), path.c_str());
+    throw_write_error(path, reason);
+  }
+  return old;
+}
+
 void flush_folder(const std::string& folder) {
   const OpenFile open(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (!open) throw_write_error(folder, errno);

@@ -49,6 +49,12 @@ std::string unique_suffix();
 /// Renames without replacing anything. Returns 0, or the errno (EEXIST where `to` exists).
 int rename_to_new(const std::string& from, const std::string& to);
 
+/// Puts a folder in the place of another, which is then called "<path>.old-<pid>-<random>".
+/// Where the file system can exchange names, `path` names the one or the other at every moment;
+/// elsewhere there is a moment, between two renames, when it names nothing.
+/// @return the new name of the old folder. Errors: kResource, and all is as before.
+std::string replace_folder(const std::string& folder, const std::string& path);
+
 /// Makes renames and new names in a folder last through a loss of power.
 void flush_folder(const std::string& folder);
 

@@ -1,6 +1,5 @@
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <stdio.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 
@@ -18,7 +17,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr char kPartMark[] = ".part-";
-constexpr char kOldMark[] = ".old-";
 
 std::string without_trailing_slashes(std::string path) {
   while (path.size() > 1 && path.back() == '/') path.pop_back();
@@ -83,24 +81,6 @@ void check_listed(const StoredFile& file, const std::string& folder) {
         fmt::format("'{}': {} bytes where {} were written; something else changed it; build "
                     "again",
                     path, status.st_size, file.size));
-}
-
-/// Puts `folder` in the place of the scene at `path`, whose files end up at the returned path.
-/// Where the file system can exchange names, no moment is without a scene.
-std::string swap_in(const std::string& folder, const std::string& path) {
-  const std::string old = path + kOldMark + unique_suffix();
-  if (::renameat2(AT_FDCWD, folder.c_str(), AT_FDCWD, path.c_str(), RENAME_EXCHANGE) == 0) {
-    // from a name that kResume would take up to one that it would not
-    return ::rename(folder.c_str(), old.c_str()) == 0 ? old : folder;
-  }
-  if (errno != EINVAL && errno != ENOSYS) throw_write_error(path, errno);
-  if (::rename(path.c_str(), old.c_str()) != 0) throw_write_error(path, errno);
-  if (::rename(folder.c_str(), path.c_str()) != 0) {
-    const int reason = errno;
-    ::rename(old.c_str(), path.c_str());
-    throw_write_error(path, reason);
-  }
-  return old;
 }
 
 }  // namespace
@@ -168,7 +148,7 @@ void SceneWriter::finish(const SceneDescription& description) {
   if (reason != 0 && (reason != EEXIST || existing_ == Existing::kRefuse))
     reason == EEXIST ? throw_exists(path_) : throw_write_error(path_, reason);
   std::string old;
-  if (reason == EEXIST) old = swap_in(folder_, path_);
+  if (reason == EEXIST) old = replace_folder(folder_, path_);
   folder_.clear();
   flush_folder(folder_of(path_));
   std::error_code ignored;

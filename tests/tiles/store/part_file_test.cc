@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <thread>
+
 #include "core/error/error.h"
 #include "tests/tiles/limits.h"
 #include "tests/tiles/temporary_folder.h"
@@ -90,6 +93,29 @@ TEST(PartFile, FullDiskLeavesNothingBehind) {
   }
   EXPECT_EQ(test::read_text(folder / "a"), "old");
   EXPECT_EQ(folder.names(), std::set<std::string>{"a"});
+}
+
+TEST(ReplaceFolder, AtEveryMomentThereIsOne) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "now");
+  std::atomic<bool> stop = false;
+  std::atomic<int> missing = 0, looks = 0;
+  std::thread looker([&] {
+    for (; !stop; ++looks) missing += std::filesystem::exists(folder / "now") ? 0 : 1;
+  });
+  while (looks == 0) std::this_thread::yield();
+  for (int i = 0; i < 3000; ++i) {
+    std::filesystem::create_directory(folder / "next");
+    const std::string old = replace_folder(folder / "next", folder / "now");
+    std::filesystem::remove(old);
+  }
+  stop = true;
+  looker.join();
+  EXPECT_EQ(missing, 0) << "of " << looks;
+  EXPECT_EQ(folder.names(), std::set<std::string>{"now"});
+  EXPECT_EQ(error_of([&] { replace_folder(folder / "next", folder / "now"); }).code(),
+            ErrorCode::kResource);
+  EXPECT_EQ(folder.names(), std::set<std::string>{"now"});
 }
 
 TEST(Checksum, HexGoesThereAndBack) {

@@ -156,6 +156,33 @@ TEST(SectionFile, HeadIsCheckedWithoutReadingTheArrays) {
   }
 }
 
+TEST(SectionFile, TheTableIsCheckedBehindItsChecksum) {
+  const KindOfFile tin = kinds_of_file()[0];
+  const auto complains = [&](const std::string& part, std::size_t at, std::uint64_t value,
+                             std::size_t size) {
+    Bytes changed = tin.bytes;
+    std::memcpy(changed.data() + at, &value, size);
+    test::reseal(changed);
+    const std::string text = complaint(changed, [](const SectionFile&) {});
+    EXPECT_NE(text.find(part), std::string::npos) << text;
+  };
+  const std::size_t second = 64 + 64;  // the entry of "triangle"
+  complains("section 1 has no proper name", second, 0, 1);
+  complains("section 1 has no proper name", second, ' ', 1);
+  complains("section 1 has no proper name", second + 12, 'x', 1);
+  complains("has the unknown type 8", second + 16, 8, 4);
+  complains("elements without numbers", second + 20, 0, 4);
+  complains("\"triangle\" (offset ", second + 20, 0xffffffff, 4);
+  complains("\"triangle\" (offset ", second + 24, ~std::uint64_t{0}, 8);
+  complains("\"triangle\" (offset ", second + 32, 320, 8);
+  complains("bytes of sections in a file of", 64 + 3 * 64 + 24, 0, 8);
+  complains("room for", 24, 0xffffffff, 4);
+  Bytes twice = tin.bytes;
+  std::copy_n(twice.begin() + 64, 16, twice.begin() + static_cast<std::ptrdiff_t>(second));
+  test::reseal(twice);
+  EXPECT_NE(complaint(twice, [](const SectionFile&) {}).find("is there twice"), std::string::npos);
+}
+
 TEST(SectionFile, MissingFilesAreTheCallersInput) {
   const TemporaryFolder folder;
   try {
@@ -224,6 +251,11 @@ TEST(TinFile, RefusesWhatCannotBeWalked) {
   complains("wrong neighbour", [](Tin& t) { t.neighbours[0][0] = 8; });
   complains("wrong neighbour", [](Tin& t) { t.neighbours[0][0] = 3; });
   complains("wrong neighbour", [](Tin& t) { t.neighbours[1] = {kNone, kNone, kNone}; });
+  complains("triangle 1 has the wrong neighbour 2", [](Tin& t) {  // two on one side of an edge
+    t.vertices = {{0, 0, 0}, {10, 0, 0}, {0, 10, 0}, {10, 10, 0}, {0, -10, 0}};
+    t.triangles = {{0, 1, 2}, {0, 1, 3}, {1, 0, 4}};
+    t.neighbours = {{kNone, kNone, 2}, {kNone, kNone, 2}, {kNone, kNone, 0}};
+  });
 }
 
 TEST(HorizonFile, RoundTrip) {
