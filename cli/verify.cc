@@ -10,36 +10,20 @@
 #include "cli/progress_bar.h"
 #include "core/culling/visible_groups.h"
 #include "core/error/error.h"
+#include "core/occlusion/splitmix64.h"
 #include "core/sight/triangle_sight.h"
 
 namespace scarp {
 namespace {
 
-/// SplitMix64 (Steele, Lea and Flood 2014): the same numbers on every machine.
-class RandomNumbers {
- public:
-  explicit RandomNumbers(std::uint64_t seed) : state_(seed) {}
-  /// In [0, 1).
-  double next() {
-    state_ += 0x9e3779b97f4a7c15;
-    std::uint64_t z = state_;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
-    return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
-  }
-
- private:
-  std::uint64_t state_;
-};
-
 /// A place over known ground, evenly distributed over the plan.
 MapPoint random_ground(const LoadedScene& scene, const GeoFrame::Placer& placer,
-                       RandomNumbers& random) {
+                       SplitMix64& random) {
   const Bounds bounds = bounds_of(scene.tin.vertices);
   for (;;) {
     Position p = round_to_lattice(
-        Position{bounds.low.x_m + random.next() * (bounds.high.x_m - bounds.low.x_m),
-                 bounds.low.y_m + random.next() * (bounds.high.y_m - bounds.low.y_m), 0});
+        Position{bounds.low.x_m + random.unit() * (bounds.high.x_m - bounds.low.x_m),
+                 bounds.low.y_m + random.unit() * (bounds.high.y_m - bounds.low.y_m), 0});
     const auto ground_m = scene.index.ground_height_m(p.x_m, p.y_m);
     if (!ground_m) continue;
     p.z_m = *ground_m;
@@ -79,7 +63,7 @@ std::vector<VerifyCounts> verify_scene(const LoadedScene& scene, int eyes,
     VerifyCounts counts;
     counts.method = "thesis";
     counts.eye_height_m = height_m;
-    RandomNumbers random(seed);  // the same places at every height
+    SplitMix64 random(seed);  // the same places at every height
     for (int i = 0; i < eyes; ++i) {
       MapPoint at = random_ground(scene, placer, random);
       at.height_m += height_m;

@@ -19,6 +19,9 @@ class SplitMix64 {
     return z ^ (z >> 31);
   }
 
+  /// A number in [0, 1), a multiple of 2^-53.
+  double unit() { return static_cast<double>(next() >> 11) * 0x1p-53; }
+
   /// A number in [0, count), uneven by less than count / 2^64. Requires count > 0.
   std::uint64_t below(std::uint64_t count) {
     assert(count > 0);
