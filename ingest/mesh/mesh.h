@@ -52,6 +52,8 @@ inline constexpr std::int32_t kMeshReachCells = 1 << 20;
 /// to the shape of a cell). The ground is the union of the cells with four known corners; it is cut
 /// out exactly along the sample edges, holes and islands included.
 ///
+/// Of the two diagonals of four vertices on one circle the one with the lesser error is taken.
+///
 /// With MeshBound::kSurface the error is bounded wherever a mesh edge crosses a grid line or either
 /// diagonal of a cell, which bounds it everywhere: between those the difference is linear.
 ///
