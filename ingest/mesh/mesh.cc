@@ -332,10 +332,12 @@ void GreedyMesher::push(const HeapEntry& entry) {
   std::push_heap(heap_.begin(), heap_.end());
 }
 
-/// Inserts until no face has an error above the goal, or the budget is used up.
+/// Inserts until no face has an error above the goal, or the budget is used up and all faces are
+/// sound (those to repair are on top of the heap).
 void GreedyMesher::insert_until(double goal_m, std::uint32_t budget) {
   std::size_t turns = 0;
-  while (!heap_.empty() && cdt_.number_of_vertices() < budget) {
+  while (!heap_.empty() &&
+         (cdt_.number_of_vertices() < budget || std::isinf(heap_.front().error_m))) {
     // Stale entries of low rank stay behind; they must not outgrow the triangulation.
     if (heap_.size() > 4 * cdt_.tds().faces().size() + 1024) {
       std::erase_if(heap_, [](const HeapEntry& e) { return e.face->info().stamp != e.stamp; });
@@ -541,12 +543,14 @@ std::optional<GridNode> GreedyMesher::shape_repair(Face f) const {
 }
 
 /// Worst crossing of the edges that a face owns: an edge belongs to the face in which it runs from
-/// the lower to the higher sample, a border edge to its only face.
+/// the lower to the higher sample. Border edges need no look: the samples along them are compared
+/// with the planes of their faces on both sides of the chord, and between those the difference is
+/// linear.
 Candidate GreedyMesher::worst_crossing(Face f) const {
   Candidate worst;
   for (int i = 0; i < 3; ++i) {
     const bool owned = index(corner(f, cdt_.ccw(i))) < index(corner(f, cdt_.cw(i)));
-    if (!owned && !f->is_constrained(i)) continue;
+    if (!owned || f->is_constrained(i)) continue;
     const Candidate edge = worst_crossing_of_edge(f, i);
     if (edge.error_m > worst.error_m ||
         (edge.error_m == worst.error_m && edge.target < worst.target))
@@ -582,10 +586,8 @@ Candidate GreedyMesher::worst_crossing_of_edge(Face f, int i) const {
       return std::numeric_limits<double>::quiet_NaN();  // on no side, so never chosen
     return static_cast<double>(orient2d(pa, pb, position(n)));
   };
-  // A border chord leaves the ground by its bend, again and again.
-  if (f->is_constrained(i) || !walk_cells(a, b, side, ground_, look))
-    return worst_crossing_in_box(a, b);
-  return worst;
+  // Beside the border an edge can leave the ground by its bend.
+  return walk_cells(a, b, side, ground_, look) ? worst : worst_crossing_in_box(a, b);
 }
 
 /// As above, for an edge that leaves the ground on its way: all cells around are tried.

@@ -19,9 +19,11 @@ enum class MeshBound {
 
 /// Exactly one of max_error_m and vertex_budget is given.
 struct MeshOptions {
-  std::optional<double> max_error_m = {};           ///< >= 0, vertical, in flattened space
-  std::optional<std::uint32_t> vertex_budget = {};  ///< stop at so many vertices
-  MeshBound bound = MeshBound::kSurface;            ///< for max_error_m
+  std::optional<double> max_error_m = {};  ///< >= 0, vertical, in flattened space
+  /// Stop at so many vertices; the corners of the border, and what bending demands, come first and
+  /// in any case.
+  std::optional<std::uint32_t> vertex_budget = {};
+  MeshBound bound = MeshBound::kSurface;  ///< for max_error_m
 };
 
 /// An error-bounded triangulation of the ground of a SampleGrid.
