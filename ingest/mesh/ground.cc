@@ -46,16 +46,16 @@ void append_split(const SampleGrid& grid, const BorderRun& run, std::vector<Bord
 }
 
 /// One grid line's runs. border(i) says whether the unit edge i of the line is border, and on which
-/// side ground lies (0 none, 1, 2); node(i) is its i-th sample, ends(i) whether a run must end
-/// there.
-template <class Border, class Node, class Ends>
+/// side ground lies (0 none, 1, 2); node(i) is its i-th sample. Where the border turns the line's
+/// edges end, and where it touches itself they change sides.
+template <class Border, class Node>
 void append_line(const SampleGrid& grid, std::int32_t units, const Border& border, const Node& node,
-                 const Ends& ends, std::vector<BorderRun>& runs) {
+                 std::vector<BorderRun>& runs) {
   for (std::int32_t i = 0; i < units;) {
     const int side = border(i);
     std::int32_t end = i + 1;
     if (side != 0) {
-      while (end < units && border(end) == side && !ends(end)) ++end;
+      while (end < units && border(end) == side) ++end;
       append_split(grid, {node(i), node(end)}, runs);
     }
     i = end;
@@ -92,7 +92,6 @@ std::vector<BorderRun> ground_border(const SampleGrid& grid, const GroundCells& 
         [&](std::int32_t c) {
           return GridNode{c, r};
         },
-        [&](std::int32_t c) { return across_column(c, r - 1) != 0 || across_column(c, r) != 0; },
         runs);
   }
   for (std::int32_t c = 0; c < grid.columns; ++c) {
@@ -101,7 +100,7 @@ std::vector<BorderRun> ground_border(const SampleGrid& grid, const GroundCells& 
         [&](std::int32_t r) {
           return GridNode{c, r};
         },
-        [&](std::int32_t r) { return across_row(c - 1, r) != 0 || across_row(c, r) != 0; }, runs);
+        runs);
   }
   return runs;
 }

@@ -19,9 +19,11 @@ enum class MeshBound {
 
 /// Exactly one of max_error_m and vertex_budget is given.
 struct MeshOptions {
-  std::optional<double> max_error_m = {};           ///< >= 0, vertical, in flattened space
-  std::optional<std::uint32_t> vertex_budget = {};  ///< stop at so many vertices
-  MeshBound bound = MeshBound::kSurface;            ///< for max_error_m
+  std::optional<double> max_error_m = {};  ///< >= 0, vertical, in flattened space
+  /// Stop at so many vertices; the corners of the border, and what bending demands, come first and
+  /// in any case.
+  std::optional<std::uint32_t> vertex_budget = {};
+  MeshBound bound = MeshBound::kSurface;  ///< for max_error_m
 };
 
 /// An error-bounded triangulation of the ground of a SampleGrid.
@@ -51,6 +53,8 @@ inline constexpr std::int32_t kMeshReachCells = 1 << 20;
 /// constrained Delaunay triangulation of the sample plane (columns to the right, rows down, scaled
 /// to the shape of a cell). The ground is the union of the cells with four known corners; it is cut
 /// out exactly along the sample edges, holes and islands included.
+///
+/// Of the two diagonals of four vertices on one circle the one with the lesser error is taken.
 ///
 /// With MeshBound::kSurface the error is bounded wherever a mesh edge crosses a grid line or either
 /// diagonal of a cell, which bounds it everywhere: between those the difference is linear.

@@ -215,6 +215,60 @@ TEST(Mesh, AStronglyBentGridIsMeshedWithoutTurnedTriangles) {
   }
 }
 
+TEST(Mesh, NoTriangleIsThinnerThanItsEdgesBend) {
+  const SampleGrid grid = bent_grid(160, 120, 0.1, 60, plain);
+  const Mesh mesh = mesh_samples(grid, within(1e5), {});
+  const double cell_m = std::min(grid.cell_x_m, grid.cell_y_m);
+  for (const auto& corners : mesh.tin.triangles) {
+    double longest_m = 0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Position &a = mesh.tin.vertices[corners[i]],
+                     &b = mesh.tin.vertices[corners[(i + 1) % 3]];
+      longest_m = std::max(longest_m, std::hypot(b.x_m - a.x_m, b.y_m - a.y_m));
+    }
+    const Position &a = mesh.tin.vertices[corners[0]], &b = mesh.tin.vertices[corners[1]],
+                   &c = mesh.tin.vertices[corners[2]];
+    const double area_m2 = (b.x_m - a.x_m) * (c.y_m - a.y_m) - (b.y_m - a.y_m) * (c.x_m - a.x_m);
+    // A chord strays by a quarter of bend times length squared, in cells.
+    const double cells = longest_m / std::max(grid.cell_x_m, grid.cell_y_m);
+    ASSERT_GT(area_m2 / longest_m, 0.25 * grid.bend_cells * cells * cells * cell_m);
+  }
+}
+
+TEST(Mesh, SmoothBentGroundIsMeasuredWhereItsTrianglesReallyLie) {
+  // Long edges, far from the samples' lines: a sample may lie in another triangle than its column
+  // and row say.
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    std::mt19937 random(seed);
+    const auto part = [&] { return 1e-3 * static_cast<double>(random() % 1000); };
+    const double a = 0.05 + 0.2 * part(), b = 0.05 + 0.2 * part(), d = 6 * part(), e = 6 * part();
+    const SampleGrid grid = bent_grid(
+        40, 36, seed % 2 ? 0.1 : 0.4, 10 + 60 * part(), [&](std::int32_t c, std::int32_t r) {
+          return 2000 * std::sin(a * c + 0.5 * b * r + d) * std::cos(b * r - 0.3 * a * c + e);
+        });
+    for (const MeshBound bound : {MeshBound::kSurface, MeshBound::kSamples}) {
+      const Mesh mesh = mesh_samples(grid, within(60 + 300 * part(), bound), {});
+      const MeasuredError judged = measure_error(grid, mesh);
+      EXPECT_NEAR(judged.at_samples_m, mesh.error_at_samples_m, kErrorRoundingM) << seed;
+      EXPECT_LE(judged.over_surface_m, mesh.error_over_surface_m + kErrorRoundingM) << seed;
+    }
+  }
+}
+
+TEST(Mesh, RoughBentGroundIsMeasuredWhereItsTrianglesReallyLie) {
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    std::mt19937 random(seed);
+    SampleGrid grid = bent_grid(40, 36, 0.4, 50, [&](std::int32_t, std::int32_t) {
+      return 16.0 * static_cast<double>(random() % 256);
+    });
+    for (std::int32_t c = 12; c < 30; ++c) grid.known[grid.index(c, 17)] = seed % 2;
+    const Mesh mesh = mesh_samples(grid, vertices(20 + seed), {});
+    const MeasuredError judged = measure_error(grid, mesh);
+    EXPECT_NEAR(judged.at_samples_m, mesh.error_at_samples_m, kErrorRoundingM) << seed;
+    EXPECT_NEAR(judged.over_surface_m, mesh.error_over_surface_m, kErrorRoundingM) << seed;
+  }
+}
+
 TEST(Mesh, IsTheSameOnEveryRun) {
   std::mt19937 random(9);
   const SampleGrid grid =
