@@ -114,9 +114,53 @@ std::optional<Stretch> stretch_over(const Tin& tin, TriangleIndex t, const Posit
   return stretch;
 }
 
+/// Where in plan a line meets the border of the ground.
+struct BorderContacts {
+  std::optional<Fraction> first_exit;  ///< to void, through the inside of an edge
+  std::optional<Fraction> last_entry;  ///< from void, in the same way
+  bool at_a = false;                   ///< an end lies on the border
+  bool at_b = false;
+  bool grazes = false;  ///< between its ends it passes over a vertex of the border or along an edge
+};
+
+BorderContacts border_contacts(const TinIndex& index, const Position& a, const Position& b) {
+  BorderContacts contacts;
+  index.visit_border_edges_along(a, b, [&](const MeshEdge& edge) {
+    const Position& u = index.tin().vertices[edge.from];
+    const Position& v = index.tin().vertices[edge.to];
+    const int u_side = orient2d(a, b, u), v_side = orient2d(a, b, v);
+    if (u_side * v_side > 0) return;
+    const int a_side = orient2d(u, v, a), b_side = orient2d(u, v, b);
+    if (a_side * b_side > 0) return;
+    if (a_side == 0 && b_side == 0) {
+      contacts.grazes = true;  // in one line; whether they overlap is for the full walk
+    } else if (a_side == 0) {
+      contacts.at_a = true;
+    } else if (b_side == 0) {
+      contacts.at_b = true;
+    } else if (u_side * v_side == 0) {
+      contacts.grazes = true;
+    } else {
+      const Fraction at = crossing(a, b, u, v);
+      std::optional<Fraction>& kept = a_side > 0 ? contacts.first_exit : contacts.last_entry;
+      const bool earlier = kept && compare(at, *kept) < 0;
+      if (!kept || earlier == (a_side > 0)) kept = at;  // ground lies on the left of an edge
+    }
+  });
+  return contacts;
+}
+
 /// Whether in plan some place of a-b over void lies between two places of it over ground.
 bool has_void_between_ground(const TinIndex& index, const Position& a, const Position& b) {
-  if (!index.may_meet_border(a, b)) return false;
+  const BorderContacts contacts = border_contacts(index, a, b);
+  if (contacts.first_exit && contacts.last_entry &&
+      compare(*contacts.first_exit, *contacts.last_entry) < 0)
+    return true;
+  // Without a crossing or touch between its ends a line is over ground or over void all along, and
+  // between two places of ground only where both ends lie on the border.
+  if (!contacts.grazes && !(contacts.at_a && contacts.at_b) &&
+      !(contacts.first_exit && contacts.at_b) && !(contacts.at_a && contacts.last_entry))
+    return false;
   std::vector<Stretch> stretches;
   index.visit_triangles_along(a, b, [&](TriangleIndex t) {
     if (const auto stretch = stretch_over(index.tin(), t, a, b)) stretches.push_back(*stretch);

@@ -273,11 +273,4 @@ bool TinIndex::is_in_hole(double x_m, double y_m) const {
   return winding != 0;
 }
 
-bool TinIndex::may_meet_border(const Position& a, const Position& b) const {
-  const std::array<Position, 2> ends{a, b};
-  return visit_bins(ends, [&](std::int32_t column, std::int32_t row) {
-    return bin_has_border_[bin(column, row)] != 0;
-  });
-}
-
 }  // namespace scarp

@@ -93,9 +93,10 @@ class TinIndex {
   template <class Visit>
   void visit_triangles_along(const Position& a, const Position& b, Visit visit) const;
 
-  /// Whether a bin that the segment's plan meets holds a border edge. Side: may say yes for a
-  /// border edge that only comes near.
-  bool may_meet_border(const Position& a, const Position& b) const;
+  /// Calls visit(edge) for every border edge that meets the plan of a segment; others and repeats
+  /// are possible.
+  template <class Visit>
+  void visit_border_edges_along(const Position& a, const Position& b, Visit visit) const;
 
  private:
   struct RowRange {
@@ -175,6 +176,18 @@ void TinIndex::visit_triangles_along(const Position& a, const Position& b, Visit
     const std::size_t at = bin(column, row);
     for (std::uint32_t i = first_triangle_[at]; i < first_triangle_[at + 1]; ++i)
       visit(bin_triangles_[i]);
+    return false;
+  });
+}
+
+template <class Visit>
+void TinIndex::visit_border_edges_along(const Position& a, const Position& b, Visit visit) const {
+  const std::array<Position, 2> ends{a, b};
+  visit_bins(ends, [&](std::int32_t column, std::int32_t row) {
+    const std::size_t at = bin(column, row);
+    if (!bin_has_border_[at]) return false;
+    for (std::uint32_t i = first_edge_[at]; i < first_edge_[at + 1]; ++i)
+      if (edges_[bin_edges_[i]].is_border()) visit(edges_[bin_edges_[i]]);
     return false;
   });
 }

@@ -8,6 +8,7 @@
 #include <sstream>
 #include <string>
 
+#include "core/geodesy/predicates.h"
 #include "tests/support/terrain.h"
 
 namespace scarp {
@@ -196,6 +197,57 @@ TEST(LineOfSight, ConeIsSeenToItsTangents) {
   EXPECT_FALSE(is_blocked(index, {0, 512, 512}, {768, 512, 128}));
   EXPECT_FALSE(is_blocked(index, {256, 512, 384}, {768, 512, 128}));
   EXPECT_TRUE(is_blocked(index, {256, 512, 384 - kStepM}, {768, 512, 128}));
+}
+
+/// Places along lines of whole steps, so that each is a lattice position and triangle_at judges it.
+TEST(LineOfSight, VoidBetweenGroundIsUnknownAndNothingElseIs) {
+  std::mt19937_64 random(5);
+  int with_void = 0, without = 0;
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    const Tin tin = test::triangulated(test::random_hills(14, 11, 8, seed, 1, 1, 0.2), seed);
+    const TinIndex index(tin);
+    const Bounds bounds = bounds_of(tin.vertices);
+    for (int line = 0; line < 400; ++line) {
+      // From above everything, so that nothing blocks; steps of 1/16 m, 512 of them.
+      constexpr int kSteps = 512;
+      const auto pick = [&](double low, double high) {
+        return std::floor(low + (high - low) * static_cast<double>(random() % 1000) / 1000);
+      };
+      const Position a{pick(bounds.low.x_m, bounds.high.x_m), pick(bounds.low.y_m, bounds.high.y_m),
+                       100};
+      const double dx = static_cast<double>(static_cast<int>(random() % 7) - 3) / 16;
+      const double dy = static_cast<double>(static_cast<int>(random() % 7) - 3) / 16;
+      if (dx == 0 && dy == 0) continue;
+      const Position b{a.x_m + kSteps * dx, a.y_m + kSteps * dy, 100};
+      int changes = 0;  // ground, void, ground is two
+      bool was_ground = false;
+      bool touches = false;  // places on the border: what lies just beside them is not sampled
+      for (int i = 0; i <= kSteps; ++i) {
+        const double x_m = a.x_m + i * dx, y_m = a.y_m + i * dy;
+        const bool ground = index.triangle_at(x_m, y_m) != kNone;
+        changes += ground != was_ground && !(changes == 0 && !ground);
+        was_ground = ground;
+        for (const MeshEdge& edge : index.edges()) {
+          const Position &u = tin.vertices[edge.from], &v = tin.vertices[edge.to];
+          touches |= edge.is_border() && orient2d(u, v, {x_m, y_m, 0}) == 0 &&
+                     x_m >= std::min(u.x_m, v.x_m) && x_m <= std::max(u.x_m, v.x_m) &&
+                     y_m >= std::min(u.y_m, v.y_m) && y_m <= std::max(u.y_m, v.y_m);
+        }
+      }
+      const bool void_between = changes >= 3 || (changes == 2 && was_ground);
+      const Sight sight = line_of_sight(index, a, b);
+      if (void_between) {
+        EXPECT_EQ(sight, Sight::kUnknown) << "seed " << seed << " line " << line;
+        ++with_void;
+      } else if (!touches && index.triangle_at(a.x_m, a.y_m) != kNone &&
+                 index.triangle_at(b.x_m, b.y_m) != kNone) {
+        EXPECT_EQ(sight, Sight::kVisible) << "seed " << seed << " line " << line;
+        ++without;
+      }
+    }
+  }
+  EXPECT_GT(with_void, 100);
+  EXPECT_GT(without, 20);
 }
 
 }  // namespace

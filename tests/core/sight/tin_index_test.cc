@@ -143,12 +143,35 @@ TEST(TinIndex, VoidsThatMeetInAVertexStaySeparate) {
   EXPECT_FALSE(index.is_in_hole(-5, 25));
 }
 
+TEST(TinIndex, BorderEdgesAlongALineAreTheCrossedOnesAndNoInnerOnes) {
+  const Tin tin = test::triangulated(test::drawn_grid(R"(
+      0 0 0 0 0
+      0 0 ? 0 0
+      0 0 0 0 0)",
+                                                      10));
+  const TinIndex index(tin);
+  std::set<std::pair<VertexIndex, VertexIndex>> seen;
+  const Position a{1, 9, 0}, b{39, 9, 0};
+  index.visit_border_edges_along(a, b, [&](const MeshEdge& edge) {
+    EXPECT_TRUE(edge.is_border());
+    seen.insert({edge.from, edge.to});
+  });
+  for (const MeshEdge& edge : index.edges()) {
+    const Position &u = tin.vertices[edge.from], &v = tin.vertices[edge.to];
+    const bool crossed =
+        orient2d(a, b, u) * orient2d(a, b, v) <= 0 && orient2d(u, v, a) * orient2d(u, v, b) <= 0;
+    if (edge.is_border() && crossed) {
+      EXPECT_TRUE(seen.count({edge.from, edge.to}));
+    }
+  }
+}
+
 TEST(TinIndex, EmptyTinHasNothingAnywhere) {
   const Tin tin;
   const TinIndex index(tin);
   EXPECT_EQ(index.triangle_at(0, 0), kNone);
   EXPECT_FALSE(index.is_in_hole(0, 0));
-  EXPECT_FALSE(index.may_meet_border({0, 0, 0}, {10, 10, 0}));
+  index.visit_border_edges_along({0, 0, 0}, {10, 10, 0}, [](const MeshEdge&) { FAIL(); });
 }
 
 }  // namespace
