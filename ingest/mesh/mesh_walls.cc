@@ -93,6 +93,7 @@ class WallMesher {
     with_edges_ = with_edges;
     take(ground_mesh);
     triangulate(ground_mesh);
+    mark_touched_cells();
     // What one face asks for may be inserted beside it and resolve a cell for another: look again
     // until nothing is asked for.
     for (scan_all(); !heap_.empty(); scan_all()) refine();
@@ -166,6 +167,36 @@ class WallMesher {
     }
     for (const auto& [a, b] : walls_.edges)
       cdt_.insert_constraint(handles[first_corner_ + a], handles[first_corner_ + b]);
+  }
+
+  /// Cells that a wall runs through or along.
+  void mark_touched_cells() {
+    touched_.assign(grid_.positions.size(), 0);
+    for (const auto& [i, k] : walls_.edges) {
+      walk(nodes_[first_corner_ + i], nodes_[first_corner_ + k], [&](double column, double row) {
+        for (const double c : {std::floor(column), std::ceil(column) - 1})
+          for (const double r : {std::floor(row), std::ceil(row) - 1})
+            touched_[grid_.index(static_cast<std::int32_t>(c), static_cast<std::int32_t>(r))] = 1;
+      });
+    }
+  }
+
+  /// Calls visit(column, row) with a place in each cell that a straight line runs through.
+  template <class Visit>
+  static void walk(const Node& a, const Node& b, const Visit& visit) {
+    std::vector<double> at{0, 1};
+    const auto add_lines = [&](double from, double to) {
+      const auto [low, high] = std::minmax(from, to);
+      for (double line = std::floor(low) + 1; line < high; ++line)
+        at.push_back((line - from) / (to - from));
+    };
+    add_lines(a.column, b.column);
+    add_lines(a.row, b.row);
+    std::sort(at.begin(), at.end());
+    for (std::size_t i = 1; i < at.size(); ++i) {
+      const double t = (at[i - 1] + at[i]) / 2;
+      visit(a.column + t * (b.column - a.column), a.row + t * (b.row - a.row));
+    }
   }
 
   /// No border runs through a face, so the cell that holds its centroid answers for all of it.
@@ -291,26 +322,14 @@ class WallMesher {
   /// Worst crossing of a mesh edge with the grid lines and diagonals of cells that no building
   /// touches and whose four corners are not all vertices.
   void worst_crossing(const Node& a, const Node& b, Candidate& worst) const {
-    std::vector<double> at{0, 1};
-    const auto add_lines = [&](double from, double to) {
-      const auto [low, high] = std::minmax(from, to);
-      for (double line = std::floor(low) + 1; line < high; ++line)
-        at.push_back((line - from) / (to - from));
-    };
-    add_lines(a.column, b.column);
-    add_lines(a.row, b.row);
-    std::sort(at.begin(), at.end());
-    for (std::size_t i = 1; i < at.size(); ++i) {
-      const double t = (at[i - 1] + at[i]) / 2;
-      const double column = a.column + t * (b.column - a.column);
-      const double row = a.row + t * (b.row - a.row);
+    walk(a, b, [&](double column, double row) {
       look_at_cell(a, b, static_cast<std::int32_t>(column), static_cast<std::int32_t>(row), worst);
-    }
+    });
   }
 
   void look_at_cell(const Node& a, const Node& b, std::int32_t c, std::int32_t r,
                     Candidate& worst) const {
-    if (!ground_(c, r)) return;
+    if (!ground_(c, r) || touched_[grid_.index(c, r)]) return;
     const auto nw = static_cast<std::uint32_t>(grid_.index(c, r));
     const std::uint32_t ne = nw + 1, sw = nw + static_cast<std::uint32_t>(grid_.columns);
     const std::uint32_t se = sw + 1;
@@ -434,6 +453,7 @@ class WallMesher {
   std::vector<std::uint32_t> node_of_ground_vertex_;  // kNone where a building covers it
   std::uint32_t first_corner_ = 0;
   std::vector<std::uint8_t> is_vertex_;  // [samples]
+  std::vector<std::uint8_t> touched_;    // [samples] the cell with that upper left
   std::vector<HeapEntry> heap_;
   std::uint32_t last_stamp_ = 0;
 };
