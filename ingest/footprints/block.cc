@@ -84,7 +84,7 @@ class BlockBuilder {
     std::vector<Geometry> outlines;
     for (const Standing* s : standing_) outlines.push_back(geos_.boundary(s->outline));
     const Geometry lines =
-        geos_.node(geos_.collection(std::move(outlines)), run_m_ * kCornerGridRuns);
+        geos_.node_until_still(geos_.collection(std::move(outlines)), corner_grid_m());
     faces_.resize(1);
     for (PlanePolygon& rings : geos_.polygons(geos_.polygonize(lines))) {
       Face face{std::move(rings)};
@@ -132,7 +132,7 @@ class BlockBuilder {
   Geometry shape_of(const std::vector<std::uint32_t>& faces) const {
     std::vector<Geometry> shapes;
     for (const std::uint32_t f : faces) shapes.push_back(geos_.polygon(faces_[f].rings));
-    return geos_.coverage_union(geos_.collection(std::move(shapes)));
+    return geos_.coverage_union(geos_.collection(std::move(shapes)), corner_grid_m());
   }
 
   /// Faces by the root of what they hang together with.
@@ -210,7 +210,8 @@ class BlockBuilder {
         if (other.level_m >= piece.level_m && other.box.meets(piece.box, 4 * run_m_))
           as_high.push_back(geos_.clone(other.shape));
       }
-      const Geometry solid = geos_.coverage_union(geos_.collection(std::move(as_high)));
+      const Geometry solid =
+          geos_.coverage_union(geos_.collection(std::move(as_high)), corner_grid_m());
       // Shrunk by more and grown again, so that necks between roofs have some width.
       const Geometry inside =
           geos_.offset(geos_.offset(solid, -least_half_width_m()), least_half_width_m() - run_m_);
@@ -241,7 +242,8 @@ class BlockBuilder {
       roof.shape = geos_.collection(std::move(rings));  // from here on its edge
       outlines.push_back(geos_.clone(roof.shape));
     }
-    const auto paths = geos_.lines(geos_.node(geos_.collection(std::move(outlines)), grid_m));
+    const auto paths =
+        geos_.lines(geos_.node_until_still(geos_.collection(std::move(outlines)), grid_m));
     for (const PlaneRing& path : paths)
       block_.points.insert(block_.points.end(), path.begin(), path.end());
     std::sort(block_.points.begin(), block_.points.end());
@@ -256,8 +258,8 @@ class BlockBuilder {
         block_.edges.push_back({number(path[i]), number(path[i + 1])});
     }
     for (const PlanePoint& p : block_.points) block_.levels_m.push_back(level_at_m(p));
-    block_.covered = geos_.polygons(
-        geos_.offset(geos_.coverage_union(geos_.collection(std::move(shapes))), run_m_));
+    block_.covered = geos_.polygons(geos_.offset(
+        geos_.coverage_union(geos_.collection(std::move(shapes)), corner_grid_m()), run_m_));
   }
 
   /// The level of the roof whose edge a corner lies on, the lowest on ties, or NaN.
@@ -271,6 +273,8 @@ class BlockBuilder {
     }
     return level_m;
   }
+
+  double corner_grid_m() const { return run_m_ * kCornerGridRuns; }
 
   /// Half of what a building must be wide to have a roof: its wall and an eighth of it.
   double least_half_width_m() const { return run_m_ * 1.125; }

@@ -52,22 +52,37 @@ class WallBuilder {
 
   WallsAndRoofs run(const std::vector<Footprint>& footprints, std::vector<std::string>& warnings) {
     std::vector<Placed> placed(footprints.size());
-    parallel_for(footprints.size(), [&](std::size_t i) {
+    in_shares(footprints.size(), [&](std::size_t begin, std::size_t end) {
       const GeosSession geos;
-      try {
-        placed[i] = place(geos, footprints[i]);
-      } catch (const GeosFailure&) {
-        placed[i] = {};
+      for (std::size_t i = begin; i < end; ++i) {
+        try {
+          placed[i] = place(geos, footprints[i]);
+        } catch (const GeosFailure&) {
+          placed[i] = {};
+        }
       }
     });
     const auto clusters = cluster(placed);
     std::vector<RaisedBlock> blocks(clusters.size());
-    parallel_for(clusters.size(), [&](std::size_t i) { blocks[i] = raise(placed, clusters[i]); });
+    in_shares(clusters.size(), [&](std::size_t begin, std::size_t end) {
+      const GeosSession geos;
+      const GeoFrame::Placer placer(*dem_.frame);
+      for (std::size_t i = begin; i < end; ++i)
+        blocks[i] = raise(geos, placer, placed, clusters[i]);
+    });
     report(placed, blocks, warnings);
     return merge(blocks);
   }
 
  private:
+  /// Sessions of GEOS and PROJ take longer to open than a block to build: one for a share of them.
+  template <class Work>
+  static void in_shares(std::size_t count, const Work& work) {
+    constexpr std::size_t kShare = 64;
+    parallel_for((count + kShare - 1) / kShare,
+                 [&](std::size_t i) { work(i * kShare, std::min(count, (i + 1) * kShare)); });
+  }
+
   GridPlace to_grid(const PlanePoint& p) const {
     return {p.x_m / grid_.cell_x_m, -p.y_m / grid_.cell_y_m};
   }
@@ -192,8 +207,8 @@ class WallBuilder {
 
   /// Leaves out, one after another, footprints at which lines come too near to each other to be
   /// told apart after rounding; that is rare, because all lines are snapped before.
-  RaisedBlock raise(const std::vector<Placed>& placed, std::vector<std::uint32_t> members) const {
-    const GeosSession geos;
+  RaisedBlock raise(const GeosSession& geos, const GeoFrame::Placer& placer,
+                    const std::vector<Placed>& placed, std::vector<std::uint32_t> members) const {
     std::uint32_t dropped = 0;
     for (; !members.empty(); ++dropped) {
       std::vector<Standing> standing;
@@ -208,7 +223,7 @@ class WallBuilder {
       std::size_t offender = 0;
       try {
         Block block = build_block(geos, all, run_m_);
-        RaisedBlock raised = raise(block);
+        RaisedBlock raised = raise(placer, block);
         raised.dropped = dropped;
         const auto conflict = conflict_of(raised);
         if (!conflict) return raised;
@@ -247,12 +262,11 @@ class WallBuilder {
     return found;
   }
 
-  RaisedBlock raise(const Block& block) const {
+  RaisedBlock raise(const GeoFrame::Placer& placer, const Block& block) const {
     RaisedBlock raised;
     raised.covered = block.covered;
     raised.buildings = block.buildings;
     raised.slivers = block.slivers;
-    const GeoFrame::Placer placer(*dem_.frame);
     for (std::size_t i = 0; i < block.points.size(); ++i)
       raised.vertices.push_back(vertex(to_grid(block.points[i]), block.levels_m[i], placer));
     for (const auto& [a, b] : block.edges) {

@@ -46,7 +46,7 @@ inline constexpr double kSliverAreaM2 = 0.5;
 
 /// Buildings keep this far, in cells, from the border of the ground, where the mesh has to follow
 /// the samples.
-inline constexpr double kBorderClearanceCells = 1.0 / 4;
+inline constexpr double kBorderClearanceCells = 1.0 / 2;
 
 /// Makes walls and roofs of footprints.
 ///

@@ -64,13 +64,28 @@ GeosSession::Geometry GeosSession::node(const Geometry& parts, double grid_m) co
   return own(GEOSUnaryUnionPrec_r(context_, parts.get(), grid_m));
 }
 
+GeosSession::Geometry GeosSession::node_until_still(const Geometry& lines, double grid_m) const {
+  constexpr int kMostRounds = 10;  // two or three are the rule; what is left then is found later
+  Geometry noded = node(lines, grid_m);
+  for (int round = 1; round < kMostRounds; ++round) {
+    Geometry again = node(noded, grid_m);
+    const char same = GEOSEqualsExact_r(context_, noded.get(), again.get(), 0);
+    if (same == 2) throw GeosFailure(reason_);
+    noded = std::move(again);
+    if (same == 1) break;
+  }
+  return noded;
+}
+
 GeosSession::Geometry GeosSession::polygonize(const Geometry& lines) const {
   const GEOSGeometry* const input[] = {lines.get()};
   return own(GEOSPolygonize_r(context_, input, 1));
 }
 
-GeosSession::Geometry GeosSession::coverage_union(const Geometry& polygons) const {
-  return own(GEOSCoverageUnion_r(context_, polygons.get()));
+GeosSession::Geometry GeosSession::coverage_union(const Geometry& polygons, double grid_m) const {
+  // GEOS takes pieces that touch each other in points only for overlapping ones, now and then.
+  GEOSGeometry* quick = GEOSCoverageUnion_r(context_, polygons.get());
+  return quick ? own(quick) : node(polygons, grid_m);
 }
 
 GeosSession::Geometry GeosSession::intersection(const Geometry& a, const Geometry& b,

@@ -65,9 +65,13 @@ class GeosSession {
   Geometry valid(const Geometry& g) const;
   /// Union of the parts of a collection: lines noded with each other, polygons dissolved.
   Geometry node(const Geometry& parts, double grid_m) const;
+  /// As node, again and again until nothing moves: rounding may take a line into the reach of
+  /// another corner. Then every corner keeps half a grid step away from the lines it is not part
+  /// of.
+  Geometry node_until_still(const Geometry& lines, double grid_m) const;
   Geometry polygonize(const Geometry& lines) const;
-  /// Union of polygons that share whole edges and do not overlap.
-  Geometry coverage_union(const Geometry& polygons) const;
+  /// Union of polygons that share whole edges, have all corners on the grid and do not overlap.
+  Geometry coverage_union(const Geometry& polygons, double grid_m) const;
   Geometry intersection(const Geometry& a, const Geometry& b, double grid_m) const;
   Geometry difference(const Geometry& a, const Geometry& b, double grid_m) const;
   /// Grown (or with distance_m < 0 shrunk) with sharp corners.

@@ -418,6 +418,37 @@ TEST(BuildWalls, RandomTownsAreSoundAndTheHighestRoofWins) {
   }
 }
 
+/// Rings of random points cross themselves and each other everywhere, at any scale of the cells.
+TEST(BuildWalls, TangledOutlinesAreSoundAtAnyCellSize) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> any(0, 1);
+  std::uint32_t pieces = 0, dropped = 0;
+  for (const double cell : {0.2, 1.0, 30.0, 1000.0}) {
+    for (int round = 0; round < 8; ++round) {
+      const Place at{round % 2 ? "EPSG:32633" : "", 400'000, 5'000'000, cell, 21, 31};
+      Town town(make_dem(at, [&](double x, double y) {
+        return cell * (std::sin(x / cell / 2) + std::cos(y / cell));
+      }));
+      std::vector<Footprint> footprints;
+      for (int i = 0; i < 12; ++i) {
+        const double x = at.x + cell * 20 * any(random), y = at.y - cell * 30 * any(random);
+        const double reach = std::min(20 * cell, 60.0) * any(random);
+        Footprint f;
+        f.height_m = 1 + std::floor(4 * any(random));
+        f.rings.resize(1);
+        for (int k = 0; k < 3 + i; ++k)
+          f.rings[0].push_back({x + reach * any(random), y + reach * any(random)});
+        footprints.push_back(f);
+      }
+      town.build(footprints, 0.05 * cell);
+      pieces += town.walls.buildings;
+      dropped += town.warned("too near");
+    }
+  }
+  EXPECT_GT(pieces, 500U);
+  EXPECT_LE(dropped, 3U);
+}
+
 TEST(BuildWalls, SameBitsForAnyThreadCount) {
   Town town(make_dem({}, kLevel));
   std::vector<Footprint> footprints;
