@@ -89,7 +89,7 @@ class WallMesher {
       : grid_(grid), walls_(walls), ground_(grid), plane_(sample_plane_of(grid)) {}
 
   Mesh run(const Mesh& ground_mesh, double goal_m, bool with_edges, const Progress& progress) {
-    goal_m_ = goal_m;
+    goal_m_ = std::max(goal_m, kErrorRoundingM / 2);
     with_edges_ = with_edges;
     take(ground_mesh);
     triangulate(ground_mesh);

@@ -467,6 +467,31 @@ TEST(BuildWalls, SameBitsForAnyThreadCount) {
   EXPECT_EQ(one.covered, town.walls.covered);
 }
 
+TEST(MeshWithWalls, WithAVertexBudgetTheErrorBesideBuildingsIsNotWorse) {
+  Town town(make_dem({}, [](double x, double y) { return 3 * std::sin(x / 4) + std::cos(y / 2); }));
+  town.build({{{box(10, -20, 20, -10)}, 8}, {{box(14, -14, 30, -4)}, 20}});
+  MeshOptions options;
+  options.vertex_budget = 200;
+  const Mesh ground = mesh_samples(town.grid, options, {});
+  town.mesh = mesh_with_walls(town.grid, options, town.walls, {});
+  EXPECT_EQ(check_tin(town.mesh.tin), std::nullopt);
+  EXPECT_GT(town.mesh.error_at_samples_m, 0);
+  EXPECT_LE(town.mesh.error_at_samples_m, ground.error_at_samples_m);
+  EXPECT_GE(town.mesh.error_over_surface_m, town.mesh.error_at_samples_m);
+  const auto corners =
+      std::count(town.mesh.sample_of_vertex.begin(), town.mesh.sample_of_vertex.end(), -1);
+  EXPECT_EQ(static_cast<std::size_t>(corners), town.walls.vertices.size());
+  EXPECT_EQ(town.mesh.sample_of_vertex.back(), -1);
+}
+
+TEST(MeshWithWalls, WithoutBuildingsIsTheMeshOfTheGround) {
+  Town town(make_dem({}, [](double x, double y) { return std::sin(x) + std::cos(y); }));
+  MeshOptions options;
+  options.max_error_m = 0.2;
+  EXPECT_EQ(mesh_with_walls(town.grid, options, {}, {}).tin.triangles,
+            mesh_samples(town.grid, options, {}).tin.triangles);
+}
+
 TEST(CheckWalls, NamesTheFirstBrokenInvariant) {
   Town town(make_dem({}, kLevel));
   town.build({{{box(10.5, -20.5, 20.5, -10.5)}, 8}});
