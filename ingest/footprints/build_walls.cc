@@ -102,7 +102,13 @@ class WallBuilder {
       if (!points.empty()) points.push_back(points.front());
     }
     GeosSession::Geometry outline = geos.polygon(rings);
-    if (!geos.is_valid(outline)) outline = geos.valid(outline);
+    if (!geos.is_valid(outline)) {
+      // Repaired outlines may carry lines and points, which overlays do not take.
+      std::vector<GeosSession::Geometry> parts;
+      for (const PlanePolygon& part : geos.polygons(geos.valid(outline)))
+        parts.push_back(geos.polygon(part));
+      outline = geos.node(geos.collection(std::move(parts)), 0);
+    }
     outline = cut_to_ground(geos, std::move(outline));
     Placed placed{geos.polygons(outline), {}, 0, false};
     if (placed.parts.empty()) return placed;

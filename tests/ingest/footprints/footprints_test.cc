@@ -333,6 +333,15 @@ TEST(BuildWalls, BowTieIsRepaired) {
   EXPECT_EQ(town.height_at(15, -11), 100);
 }
 
+TEST(BuildWalls, OutlineWithASpikeIsCutAtTheBorder) {
+  Town town(make_dem({}, kLevel));
+  town.build(
+      {{{{{-4, -20}, {20, -20}, {20, -12}, {30, -12}, {20, -12}, {20, -10}, {-4, -10}}}, 8}});
+  EXPECT_EQ(town.walls.buildings, 1U);
+  EXPECT_EQ(town.height_at(5, -15), 108);
+  EXPECT_EQ(town.height_at(25, -12), 100);
+}
+
 TEST(BuildWalls, CutWhereTheGroundEnds) {
   Dem dem = make_dem({}, kLevel);
   for (std::int32_t r = 10; r < 20; ++r)
@@ -424,7 +433,7 @@ TEST(BuildWalls, TangledOutlinesAreSoundAtAnyCellSize) {
   std::uniform_real_distribution<double> any(0, 1);
   std::uint32_t pieces = 0, dropped = 0;
   for (const double cell : {0.2, 1.0, 30.0, 1000.0}) {
-    for (int round = 0; round < 8; ++round) {
+    for (int round = 0; round < 4; ++round) {
       const Place at{round % 2 ? "EPSG:32633" : "", 400'000, 5'000'000, cell, 21, 31};
       Town town(make_dem(at, [&](double x, double y) {
         return cell * (std::sin(x / cell / 2) + std::cos(y / cell));
@@ -445,8 +454,8 @@ TEST(BuildWalls, TangledOutlinesAreSoundAtAnyCellSize) {
       dropped += town.warned("too near");
     }
   }
-  EXPECT_GT(pieces, 500U);
-  EXPECT_LE(dropped, 3U);
+  EXPECT_GT(pieces, 200U);
+  EXPECT_EQ(dropped, 0U);
 }
 
 TEST(BuildWalls, SameBitsForAnyThreadCount) {
