@@ -16,7 +16,9 @@
 #include "core/occlusion/build_groups.h"
 #include "core/raster/preview.h"
 #include "ingest/dem/dem.h"
+#include "ingest/footprints/footprints.h"
 #include "ingest/mesh/mesh.h"
+#include "ingest/mesh/mesh_walls.h"
 #include "tiles/layers/png_image.h"
 #include "tiles/store/groups_file.h"
 #include "tiles/store/horizon_file.h"
@@ -71,14 +73,25 @@ class Build {
     if (options_.vertices)
       mesh_options_.vertex_budget = options_.vertices;
     else
-      mesh_options_.max_error_m = options_.max_error_m.value_or(
-          kDefaultErrorCells * std::min(grid_.cell_x_m, grid_.cell_y_m));
-    mesh_ = mesh_samples(grid_, mesh_options_, progress);
+      mesh_options_.max_error_m = options_.max_error_m.value_or(default_error_m());
+    mesh_ = mesh_with_walls(grid_, mesh_options_, walls(), progress);
     index_.emplace(mesh_.tin);
     heights_m_ = vertex_heights_m(mesh_.tin, *dem_.frame);
     write_tin(writer_.path_for(tile_file_name(kTile, "tin")), mesh_.tin, mesh_.sample_of_vertex,
               Existing::kRefuse);
     tile_.files.push_back(writer_.record(tile_file_name(kTile, "tin"), "tin"));
+  }
+
+  /// The buildings of --footprints; their walls' feet follow the ground as closely as the mesh.
+  WallsAndRoofs walls() {
+    if (options_.footprints_file.empty()) return {};
+    const double foot_error_m = mesh_options_.max_error_m.value_or(default_error_m());
+    return add_footprints(dem_, grid_, options_.footprints_file, options_.footprints_height_field,
+                          foot_error_m, dem_.warnings);
+  }
+
+  double default_error_m() const {
+    return kDefaultErrorCells * std::min(grid_.cell_x_m, grid_.cell_y_m);
   }
 
   void horizons(const Progress& progress) {
