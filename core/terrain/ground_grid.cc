@@ -1,5 +1,6 @@
 #include "core/terrain/ground_grid.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -93,6 +94,38 @@ Position GroundGrid::raised(std::int32_t column, std::int32_t row, double height
           z};
 }
 
+Position GroundGrid::place(double column, double row, double height_m) const {
+  const auto c = static_cast<std::int32_t>(column), r = static_cast<std::int32_t>(row);
+  const double right = column - c, below = row - r;
+  if (const auto* blocks = std::get_if<BlockPlacement>(&placement_)) {
+    const auto value = [&](BlockPlacement::Quantity quantity) {
+      return BlockPlacement::Along(*blocks, quantity, c, r, below)
+          .at(blocks->local(c) + right * (2.0 / blocks->side));
+    };
+    const double z =
+        value(BlockPlacement::kHeight) +
+        height_m * value(BlockPlacement::kLift) / (1 + height_m * value(BlockPlacement::kFall));
+    return round_to_lattice(Position{value(BlockPlacement::kX) + value(BlockPlacement::kTiltX) * z,
+                                     value(BlockPlacement::kY) + value(BlockPlacement::kTiltY) * z,
+                                     z});
+  }
+  const std::int32_t next_c = right > 0 ? c + 1 : c, next_r = below > 0 ? r + 1 : r;
+  const Position nw = at(c, r), ne = at(next_c, r), sw = at(c, next_r), se = at(next_c, next_r);
+  const auto between = [&](double Position::*axis) {
+    const double north = nw.*axis + right * (ne.*axis - nw.*axis);
+    const double south = sw.*axis + right * (se.*axis - sw.*axis);
+    return north + below * (south - north);
+  };
+  return round_to_lattice(Position{between(&Position::x_m), between(&Position::y_m), height_m});
+}
+
+double GroundGrid::height_m(std::int32_t column, std::int32_t row) const {
+  assert(is_known(column, row));
+  const double z = steps_[index(column, row)] * kLatticeStepM;
+  const auto* blocks = std::get_if<BlockPlacement>(&placement_);
+  return blocks ? height_on_normal(*blocks, column, row, z) : z;
+}
+
 double GroundGrid::height_above_ground_m(std::int32_t column, std::int32_t row, double z_m) const {
   assert(is_known(column, row));
   const double ground_m = steps_[index(column, row)] * kLatticeStepM;
@@ -107,22 +140,36 @@ void GroundGrid::set_z(std::int32_t column, std::int32_t row, double z_m) {
   steps_[index(column, row)] = static_cast<std::int32_t>(std::nearbyint(z_m / kLatticeStepM));
 }
 
-bool GroundGrid::set_row_heights(std::int32_t row, const double* heights_m,
-                                 const std::uint8_t* known) {
-  std::int32_t* to = &steps_[index(0, row)];
+bool GroundGrid::set_heights(std::int32_t row, std::int32_t first_column,
+                             std::span<const double> heights_m, const std::uint8_t* known) {
+  assert(first_column >= 0 &&
+         first_column + static_cast<std::int64_t>(heights_m.size()) <= columns_);
+  std::int32_t* to = &steps_[index(0, row)] + first_column;
   const auto* blocks = std::get_if<BlockPlacement>(&placement_);
   bool within = true;
-  for (std::int32_t column = 0; column < columns_; ++column) {
-    if (!known[column]) {
-      to[column] = kVoid;
-      continue;
-    }
-    const double z =
-        blocks ? flattened_height(*blocks, column, row, heights_m[column]) : heights_m[column];
+  const auto set = [&](std::size_t i, double z) {
+    if (!known[i]) return;
     const bool reached = std::abs(z) < kReachZ_m - 1;
     within = within && reached;
-    to[column] =
-        reached ? static_cast<std::int32_t>(std::nearbyint(z * (1 / kLatticeStepM))) : kVoid;
+    if (reached) to[i] = static_cast<std::int32_t>(round_to_lattice(z) * (1 / kLatticeStepM));
+  };
+  if (!blocks) {
+    for (std::size_t i = 0; i < heights_m.size(); ++i) set(i, heights_m[i]);
+    return within;
+  }
+  for (std::size_t i = 0; i < heights_m.size();) {
+    const std::int32_t column = first_column + static_cast<std::int32_t>(i);
+    const BlockPlacement::Along height(*blocks, BlockPlacement::kHeight, column, row),
+        lift(*blocks, BlockPlacement::kLift, column, row),
+        fall(*blocks, BlockPlacement::kFall, column, row);
+    const std::size_t end = std::min(
+        heights_m.size(), i + static_cast<std::size_t>(blocks->side - column % blocks->side));
+    double u = blocks->local(column);
+    const double step = 2.0 / blocks->side;
+    for (; i < end; ++i, u += step) {
+      const double h = heights_m[i];
+      set(i, height.at(u) + h * lift.at(u) / (1 + h * fall.at(u)));
+    }
   }
   return within;
 }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <variant>
 #include <vector>
 
@@ -47,14 +48,26 @@ struct BlockPlacement {
     return blocks[static_cast<std::size_t>(row / side) * static_cast<std::size_t>(blocks_across) +
                   static_cast<std::size_t>(column / side)];
   }
-  /// Place within a block, in [-1, 1).
+  /// Place within a block, in [-1, 1), and up to 1 beyond its last sample.
   double local(std::int32_t index) const { return (index % side) * (2.0 / side) - 1; }
 
+  /// One quantity along the part of a row that a block holds.
+  struct Along {
+    double constant, linear, square;
+
+    Along(const BlockPlacement& blocks, Quantity quantity, std::int32_t column, std::int32_t row,
+          double below_row = 0) {
+      const double v = blocks.local(row) + below_row * (2.0 / blocks.side);
+      const Biquadratic& k = blocks.block_of(column, row)[quantity];
+      constant = k[0] + v * (k[1] + v * k[2]);
+      linear = k[3] + v * (k[4] + v * k[5]);
+      square = k[6] + v * (k[7] + v * k[8]);
+    }
+    double at(double u) const { return constant + u * (linear + u * square); }
+  };
+
   double value(Quantity quantity, std::int32_t column, std::int32_t row) const {
-    const double u = local(column), v = local(row);
-    const Biquadratic& k = block_of(column, row)[quantity];
-    return k[0] + v * (k[1] + v * k[2]) +
-           u * (k[3] + v * (k[4] + v * k[5]) + u * (k[6] + v * (k[7] + v * k[8])));
+    return Along(*this, quantity, column, row).at(local(column));
   }
 };
 
@@ -85,6 +98,12 @@ class GroundGrid {
   Position at(std::int32_t column, std::int32_t row) const;
   /// A target above a sample, along the normal, rounded to the lattice. Requires a known sample.
   Position raised(std::int32_t column, std::int32_t row, double height_m) const;
+  /// A point between the samples, on a normal of its own. On a sample and at its height it is the
+  /// sample, but for the lattice. Requires 0 <= column <= columns - 1, and so for the row.
+  /// @param height_m  above the ellipsoid, above the plane where the earth is flat
+  Position place(double column, double row, double height_m) const;
+  /// Height above the ellipsoid (the plane) of a known sample, metres.
+  double height_m(std::int32_t column, std::int32_t row) const;
   /// The inverse: how far along the normal a flattened height lies above a known sample, metres.
   double height_above_ground_m(std::int32_t column, std::int32_t row, double z_m) const;
 
@@ -96,10 +115,11 @@ class GroundGrid {
   void set_void(std::int32_t column, std::int32_t row) { steps_[index(column, row)] = kVoid; }
   /// Requires |z| < kReachZ_m.
   void set_z(std::int32_t column, std::int32_t row, double z_m);
-  /// Sets a row from heights above the ellipsoid (above the plane where the earth is flat);
-  /// samples whose known is 0 become void. @return false where a height is out of reach
-  [[nodiscard]] bool set_row_heights(std::int32_t row, const double* heights_m,
-                                     const std::uint8_t* known);
+  /// Sets a part of a row, from a column on, from heights above the ellipsoid (above the plane
+  /// where the earth is flat), metres. Samples whose known is 0 are left as they are.
+  /// @return false where a height is out of reach
+  [[nodiscard]] bool set_heights(std::int32_t row, std::int32_t first_column,
+                                 std::span<const double> heights_m, const std::uint8_t* known);
 
  private:
   std::size_t index(std::int32_t column, std::int32_t row) const {

@@ -113,7 +113,7 @@ class PartSweep::Run {
         grid_(sight_.grid()),
         frame_(sight_.frame()),
         target_height_m_(sweep.target_height_m_),
-        reach_cells_(sweep.reach_cells_),
+        window_(sweep.window_),
         result_(result),
         part_(part) {
     over_columns_ = part.wedge == SweepPart::kEast || part.wedge == SweepPart::kWest;
@@ -135,7 +135,10 @@ class PartSweep::Run {
     // Lines behind the eye begin segments that reach in front of it.
     const std::int64_t near_begin = at_least(-kNearCells);
     const std::int64_t far_begin = at_least(kNearCells);
-    const std::int64_t border = outwards_ > 0 ? lines_ : -1;
+    // Nothing beyond a target's line can block it.
+    const std::int64_t border =
+        outwards_ > 0 ? (over_columns_ ? window_.last_column : window_.last_row) + 1
+                      : (over_columns_ ? window_.first_column : window_.first_row) - 1;
     const auto inside = [&](std::int64_t line) { return line >= 0 && line < lines_; };
     for (std::int64_t line = near_begin; line != far_begin + outwards_; line += outwards_)
       if (inside(line)) sweep_near(static_cast<std::int32_t>(line), line != far_begin);
@@ -144,8 +147,7 @@ class PartSweep::Run {
       begin = outwards_ > 0 ? std::max<std::int64_t>(begin, 0)
                             : std::min<std::int64_t>(begin, lines_ - 1);
     if (!inside(begin)) return counts_;
-    for (std::int64_t line = begin; line != border; line += outwards_) {
-      if (std::abs(static_cast<double>(line) - eye_line_) > reach_cells_) break;
+    for (std::int64_t line = begin; (border - line) * outwards_ > 0; line += outwards_) {
       sweep_line(static_cast<std::int32_t>(line), line == begin);
     }
     return counts_;
@@ -161,6 +163,10 @@ class PartSweep::Run {
   }
   bool is_known(std::int32_t line, std::int32_t i) const {
     return over_columns_ ? grid_.is_known(line, i) : grid_.is_known(i, line);
+  }
+
+  bool is_target(std::int32_t line, std::int32_t i) const {
+    return over_columns_ ? window_.contains(line, i) : window_.contains(i, line);
   }
 
   Picture picture(const Position& p) const {
@@ -224,7 +230,7 @@ class PartSweep::Run {
   const GroundGrid& grid_;
   const PlanFrame& frame_;
   double target_height_m_;
-  double reach_cells_;
+  SampleWindow window_;
   std::span<Sight> result_;
   SweepPart part_;
 
@@ -266,7 +272,7 @@ void PartSweep::Run::sweep_near(std::int32_t line, bool judge_targets) {
     if (i < last)
       add_near_segment(line, p, is_known(line, i), position(line, i + 1), is_known(line, i + 1),
                        true);
-    if (owns(picture(p)) && is_known(line, i)) {
+    if (is_target(line, i) && owns(picture(p)) && is_known(line, i)) {
       ++counts_.targets;
       write(line, i, judge(line, i));
     }
@@ -457,6 +463,7 @@ void PartSweep::Run::decide(const Line& line) {
     const float t = line.t[n];
     if (t < -1 || t > bins + 1 || line.is_void(k)) continue;
     const std::int32_t i = line.first + k;
+    if (!is_target(line.number, i)) continue;
     if ((t < 1 || t > bins - 1) && !owns(picture(position(line.number, i)))) continue;
     ++counts_.targets;
     float at_t = t, at_s = line.s[n];
@@ -576,26 +583,30 @@ void PartSweep::Run::sweep_line(std::int32_t line, bool is_first) {
   std::swap(line_, before_);
 }
 
-PartSweep::PartSweep(const GridSight& sight, double target_height_m, double reach_cells)
-    : sight_(sight), target_height_m_(target_height_m), reach_cells_(reach_cells) {}
+PartSweep::PartSweep(const GridSight& sight, double target_height_m, const SampleWindow& window)
+    : sight_(sight), target_height_m_(target_height_m), window_(window) {}
 
 SweepCounts PartSweep::run(const SweepPart& part, std::span<Sight> result) {
   return Run(*this, part, result).run();
 }
 
 SweepCounts sweep_viewshed(const GroundGrid& grid, const Position& eye, double target_height_m,
-                           std::span<Sight> result) {
+                           const SampleWindow& window, std::span<Sight> result) {
   const auto columns = static_cast<std::size_t>(grid.columns());
   assert(result.size() == columns * static_cast<std::size_t>(grid.rows()));
   const GridSight sight(grid, eye);
-  std::fill(result.begin(), result.end(), Sight::kUnknown);
+  if (window.last_column < window.first_column) return {};
+  for (std::int32_t row = window.first_row; row <= window.last_row; ++row) {
+    const auto begin = result.begin() + static_cast<std::ptrdiff_t>(row) * grid.columns();
+    std::fill(begin + window.first_column, begin + window.last_column + 1, Sight::kUnknown);
+  }
   constexpr std::size_t kWedges = 4;
   constexpr auto kParts = static_cast<std::size_t>(SweepPart::kPartsInWedge);
   std::array<SweepCounts, kWedges * kParts> counts;
   parallel_for(counts.size(), [&](std::size_t i) {
     const SweepPart part{static_cast<SweepPart::Wedge>(i % kWedges),
                          static_cast<std::int32_t>(i / kWedges)};
-    counts[i] = PartSweep(sight, target_height_m, 1e9).run(part, result);
+    counts[i] = PartSweep(sight, target_height_m, window).run(part, result);
   });
   SweepCounts sum;
   for (const SweepCounts& c : counts) {
@@ -611,7 +622,7 @@ SweepCounts sweep_viewshed(const GroundGrid& grid, const Position& eye, double t
   const std::int32_t row = near(sight.frame().eye_row, grid.rows());
   const Position p = grid.at(column, row);
   if (sight.frame().across(p.x_m, p.y_m) == 0 && sight.frame().down(p.x_m, p.y_m) == 0 &&
-      grid.is_known(column, row)) {
+      window.contains(column, row) && grid.is_known(column, row)) {
     result[static_cast<std::size_t>(row) * columns + static_cast<std::size_t>(column)] =
         sight.judge(grid.raised(column, row, target_height_m), column, row);
     ++sum.targets;

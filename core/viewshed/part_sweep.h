@@ -6,6 +6,7 @@
 
 #include "core/terrain/ground_grid.h"
 #include "core/viewshed/grid_sight.h"
+#include "core/viewshed/view_limits.h"
 
 namespace scarp {
 
@@ -45,10 +46,11 @@ class PartSweep {
  public:
   /// @param sight            judge for the same grid and eye, kept by reference
   /// @param target_height_m  of targets above their samples
-  /// @param reach_cells      lines farther than this from the eye are left out, with their targets
-  PartSweep(const GridSight& sight, double target_height_m, double reach_cells);
+  /// @param window           samples outside are no targets, though they block
+  PartSweep(const GridSight& sight, double target_height_m, const SampleWindow& window);
 
-  /// @param result[out]  [rows * columns]; the part's known samples are written, others left
+  /// @param result[out]  [rows * columns]; the part's known samples in the window are written,
+  /// others left
   SweepCounts run(const SweepPart& part, std::span<Sight> result);
 
  private:
@@ -58,12 +60,12 @@ class PartSweep {
 
   const GridSight& sight_;
   double target_height_m_;
-  double reach_cells_;
+  SampleWindow window_;
 };
 
 /// All parts on all threads. The same bits for any number of threads.
-/// @param result[out]  [rows * columns], kUnknown where the sample is void
+/// @param result[out]  [rows * columns]; the window is written, kUnknown where the sample is void
 SweepCounts sweep_viewshed(const GroundGrid& grid, const Position& eye, double target_height_m,
-                           std::span<Sight> result);
+                           const SampleWindow& window, std::span<Sight> result);
 
 }  // namespace scarp

@@ -25,7 +25,7 @@ std::vector<Sight> judged(const GroundGrid& grid, const Position& eye, double ta
 std::vector<Sight> swept(const GroundGrid& grid, const Position& eye, double target_m,
                          SweepCounts* counts = nullptr) {
   std::vector<Sight> sight(static_cast<std::size_t>(grid.columns() * grid.rows()));
-  const SweepCounts c = sweep_viewshed(grid, eye, target_m, sight);
+  const SweepCounts c = sweep_viewshed(grid, eye, target_m, whole_window(grid), sight);
   if (counts) *counts = c;
   return sight;
 }
