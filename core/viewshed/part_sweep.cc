@@ -609,11 +609,7 @@ SweepCounts sweep_viewshed(const GroundGrid& grid, const Position& eye, double t
     counts[i] = PartSweep(sight, target_height_m, window).run(part, result);
   });
   SweepCounts sum;
-  for (const SweepCounts& c : counts) {
-    sum.targets += c.targets;
-    sum.traced_part += c.traced_part;
-    sum.traced_whole += c.traced_whole;
-  }
+  for (const SweepCounts& of_part : counts) sum.add(of_part);
   // The sample under the eye belongs to no part.
   const auto near = [](double at, std::int32_t count) {
     return static_cast<std::int32_t>(std::lround(std::clamp(at, 0.0, count - 1.0)));

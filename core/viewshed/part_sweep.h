@@ -26,6 +26,12 @@ struct SweepCounts {
   std::uint64_t targets = 0;
   std::uint64_t traced_part = 0;   ///< compared exactly with the lines that might block them
   std::uint64_t traced_whole = 0;  ///< judged over their whole length
+
+  void add(const SweepCounts& more) {
+    targets += more.targets;
+    traced_part += more.traced_part;
+    traced_whole += more.traced_whole;
+  }
 };
 
 /// The fast way to what GridSight judges, for all samples of a part. Zero cells differ.
