@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <map>
 #include <new>
 
 #include "cli/commands.h"
@@ -82,6 +83,46 @@ void add_build(CLI::App& app, BuildOptions& o, std::function<int()>& run) {
   add_surface(*c, o.dem);
   add_common(*c, o.common);
   c->callback([&] { run = [&o] { return run_build(o); }; });
+}
+
+void add_viewshed(CLI::App& app, ViewshedOptions& o, std::function<int()>& run) {
+  CLI::App* c = app.add_subcommand("viewshed", "What one eye or several see of a DEM, exactly");
+  c->footer(
+      "Example:\n  scarp viewshed alps.tif --observer 8.65,46.55,2 --crs OGC:CRS84 -o seen.tif\n"
+      "1 visible, 0 hidden, 255 unknown (void). On the ellipsoid wherever the DEM has a CRS, in\n"
+      "degrees too. Several DEMs that share their cells make one mosaic.");
+  c->add_option("dem", o.dem_files, "Any rasters that GDAL reads")->required();
+  c->add_option("-o,--output", o.output, "The raster of the answer, a cloud-optimised GeoTIFF")
+      ->required();
+  c->add_option_function<std::vector<std::string>>(
+       "--observer",
+       [&o](const std::vector<std::string>& texts) {
+         for (const std::string& text : texts) o.observers.push_back(parse_position(text));
+       },
+       "An eye at X,Y[,H]: H metres above ground (2), or as 1200asl; may be repeated")
+      ->allow_extra_args(false);
+  c->add_option("--crs", o.crs, "CRS of the observers, such as OGC:CRS84; the DEM's unless given");
+  c->add_option("--target-height", o.target_height_m, "Metres above ground of what is looked for")
+      ->check(CLI::Range(0.0, 100'000.0));
+  c->add_option("--max-distance", o.max_distance_m, "Metres along the ground")
+      ->check(CLI::PositiveNumber);
+  c->add_option("--min-distance", o.min_distance_m, "Metres along the ground")
+      ->check(CLI::NonNegativeNumber);
+  c->add_option_function<std::string>(
+      "--azimuth",
+      [&o](const std::string& text) { o.azimuth_deg = parse_range("--azimuth", text); },
+      "FROM,TO: degrees clockwise from true north (from grid north without a CRS)");
+  c->add_option_function<std::string>(
+      "--pitch", [&o](const std::string& text) { o.pitch_deg = parse_range("--pitch", text); },
+      "LOWEST,HIGHEST: degrees above the level plane of the eye");
+  c->add_option("--mode", o.mode,
+                "visible: seen by an eye; count: by how many eyes; visible unless given")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, ViewshedMode>{
+          {"visible", ViewshedMode::kVisible}, {"count", ViewshedMode::kCount}}));
+  c->add_flag("--gdal-values", o.gdal_values, "Write 255 for visible, as gdal_viewshed does");
+  add_surface(*c, o.dem);
+  add_common(*c, o.common);
+  c->callback([&] { run = [&o] { return run_viewshed(o); }; });
 }
 
 void add_cull(CLI::App& app, CullOptions& o, std::function<int()>& run) {
@@ -166,12 +207,14 @@ int run_command_line(int argc, char** argv) {
   CullOptions cull;
   VerifyOptions verify;
   PreviewCommandOptions preview;
+  ViewshedOptions viewshed;
   CheckOptions check;
   std::function<int()> run;
   add_build(app, build, run);
   add_cull(app, cull, run);
   add_verify(app, verify, run);
   add_preview(app, preview, run);
+  add_viewshed(app, viewshed, run);
   add_check(app, check, run);
   try {
     app.parse(argc, argv);
@@ -183,8 +226,8 @@ int run_command_line(int argc, char** argv) {
     return report(e.what(), 2);
   }
   try {
-    for (CommonOptions* common :
-         {&build.common, &cull.common, &verify.common, &preview.common, &check.common}) {
+    for (CommonOptions* common : {&build.common, &cull.common, &verify.common, &preview.common,
+                                  &viewshed.common, &check.common}) {
       if (!common->memory_budget_bytes) common->memory_budget_bytes = machine_memory_bytes() / 2;
       if (common->threads) set_thread_count(common->threads);
     }

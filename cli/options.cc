@@ -52,6 +52,17 @@ TypedPosition parse_position(const std::string& text) {
   return position;
 }
 
+std::pair<double, double> parse_range(const std::string& option, const std::string& text) {
+  std::string_view rest = text;
+  const auto from = take_number(rest);
+  const bool comma = take(rest, ",");
+  const auto to = take_number(rest);
+  if (!from || !comma || !to || !rest.empty())
+    throw Error(ErrorCode::kUsage,
+                fmt::format("{} {}: not understood; two numbers A,B were expected", option, text));
+  return {*from, *to};
+}
+
 std::uint64_t parse_bytes(const std::string& text) {
   std::string_view rest = text;
   const auto value = take_number(rest);

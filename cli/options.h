@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "ingest/dem/dem.h"
@@ -47,6 +48,24 @@ struct BuildOptions {
   std::string crs;  ///< of the observer; empty: the data's
 };
 
+enum class ViewshedMode { kVisible, kCount, kGround, kDem };
+
+struct ViewshedOptions {
+  CommonOptions common;
+  DemOptions dem;
+  std::vector<std::string> dem_files;
+  std::string output;
+  std::vector<TypedPosition> observers;
+  std::string crs;  ///< of the observers; empty: the data's
+  ViewshedMode mode = ViewshedMode::kVisible;
+  double target_height_m = 0;
+  double min_distance_m = 0;
+  std::optional<double> max_distance_m;
+  std::optional<std::pair<double, double>> azimuth_deg;  ///< from, to, clockwise from north
+  std::optional<std::pair<double, double>> pitch_deg;    ///< lowest, highest
+  bool gdal_values = false;                              ///< 255 visible, 0 hidden
+};
+
 struct CullOptions {
   CommonOptions common;
   std::string scene;
@@ -83,6 +102,9 @@ struct CheckOptions {
 
 /// Reads "X,Y[,H]". Throws Error{kUsage}.
 TypedPosition parse_position(const std::string& text);
+
+/// Reads "A,B", two numbers. Throws Error{kUsage} that names the option.
+std::pair<double, double> parse_range(const std::string& option, const std::string& text);
 
 /// Reads "2GiB", "512M", "1000000" and the like as bytes. Throws Error{kUsage}.
 std::uint64_t parse_bytes(const std::string& text);

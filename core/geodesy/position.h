@@ -27,7 +27,9 @@ struct Position {
 
 /// Nearest multiple of kLatticeStepM; ties to even. Requires |value_m| <= kLatticeReachM.
 inline double round_to_lattice(double value_m) {
-  return std::nearbyint(value_m / kLatticeStepM) * kLatticeStepM;
+  // A double this large has steps of the lattice, so the addition rounds to it.
+  constexpr double kRounder = 0x1.8p52 * kLatticeStepM;
+  return (value_m + kRounder) - kRounder;
 }
 
 inline Position round_to_lattice(const Position& p) {

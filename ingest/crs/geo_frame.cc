@@ -175,6 +175,11 @@ GeoFrame::GeoFrame(const FrameDescription& description) : description_(descripti
 
 GeoFrame::~GeoFrame() = default;
 
+std::optional<EarthFrame> GeoFrame::earth_frame() const {
+  if (!datum_) return {};
+  return EarthFrame{*datum_->frame, datum_->semi_major_m, datum_->flattening};
+}
+
 GeoFrame::Placer::Placer(const GeoFrame& frame) : impl_(std::make_unique<Impl>()) {
   impl_->frame = &frame;
   if (frame.description_.earth == Earth::kFlat) return;
@@ -202,6 +207,10 @@ void GeoFrame::Placer::place(std::span<const MapPoint> points,
 }
 
 Position GeoFrame::Placer::place(const MapPoint& point) const {
+  return round_to_lattice(place_unrounded(point));
+}
+
+Position GeoFrame::Placer::place_unrounded(const MapPoint& point) const {
   const GeoFrame& frame = *impl_->frame;
   const auto out_of_reach = [&]() -> Error {
     return {ErrorCode::kInput,
@@ -228,7 +237,7 @@ Position GeoFrame::Placer::place(const MapPoint& point) const {
   if (!(std::abs(p.x_m) < kLatticeReachM && std::abs(p.y_m) < kLatticeReachM &&
         std::abs(p.z_m) < kLatticeReachM))
     throw out_of_reach();
-  return round_to_lattice(p);
+  return p;
 }
 
 MapPoint GeoFrame::Placer::unplace(const Position& p) const {
@@ -253,6 +262,13 @@ MapPoint GeoFrame::Placer::unplace(const Position& p) const {
     x += turn * std::round((description.centre_x - x) / turn);
   }
   return {x, at.xy.y, height_m};
+}
+
+double GeoFrame::Placer::undulation_m(double x, double y) const {
+  const GeoFrame& frame = *impl_->frame;
+  if (!frame.geoid_) return 0;
+  const GeodeticPoint at = impl_->geodetic(x, y);
+  return frame.geoid_->undulation_m(at.longitude_deg, at.latitude_deg);
 }
 
 double GeoFrame::Placer::plane_direction_rad(const MapPoint& from, double azimuth_deg) const {

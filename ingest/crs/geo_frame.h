@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 
+#include "core/geodesy/earth_frame.h"
 #include "core/geodesy/position.h"
 
 namespace scarp {
@@ -54,6 +55,8 @@ class GeoFrame {
 
   const FrameDescription& description() const { return description_; }
   bool is_geographic() const { return geographic_; }
+  /// The ellipsoid and the frame on it, for what core computes on the Earth; nothing where flat.
+  std::optional<EarthFrame> earth_frame() const;
 
   class Placer {
    public:
@@ -65,12 +68,17 @@ class GeoFrame {
     /// or that lie more than 87 degrees from the centre.
     void place(std::span<const MapPoint> points, std::span<Position> positions) const;
     Position place(const MapPoint& point) const;
+    /// The same before rounding to the lattice.
+    Position place_unrounded(const MapPoint& point) const;
 
     /// The inverse, for what leaves the program.
     MapPoint unplace(const Position& p) const;
 
     /// Requires an ellipsoidal frame.
     GeodeticPoint geodetic(double x, double y) const;
+
+    /// Undulation that place adds to heights at a map point, metres; 0 without a geoid.
+    double undulation_m(double x, double y) const;
 
     /// Direction in the flattened plane, radians counter-clockwise from +x, in which an azimuth
     /// leaves a point: degrees clockwise from true north, from grid north in a flat frame.

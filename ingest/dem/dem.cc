@@ -9,10 +9,13 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <numeric>
+#include <span>
 
 #include "core/error/error.h"
 #include "core/threads/parallel_for.h"
 #include "ingest/dem/gdal_session.h"
+#include "ingest/dem/ground_placement.h"
 
 namespace scarp {
 namespace {
@@ -27,6 +30,9 @@ constexpr double kHighestGroundM = 30'000;
 constexpr double kGridMismatchCells = 0.01;
 
 constexpr int kRowsPerRead = 64;
+
+/// Pieces that a file is read in at once, so that threads end together.
+constexpr int kBandsPerThread = 4;
 
 [[noreturn]] void refuse(const std::string& file, const std::string& rest) {
   throw Error(ErrorCode::kInput, fmt::format("'{}': {}", file, rest));
@@ -236,6 +242,28 @@ class HeightReader {
     return known;
   }
 
+  /// Heights in metres, row by row: put(row from the north, heights, known).
+  template <typename Put>
+  void read_rows_to(int first_row, int end_row, const Put& put) {
+    const auto width = static_cast<std::size_t>(source_.columns);
+    std::vector<double> values(width * kRowsPerRead);
+    std::vector<std::uint8_t> mask(width * kRowsPerRead, 255);
+    for (int row = first_row; row < end_row; row += kRowsPerRead) {
+      const int count = std::min(kRowsPerRead, end_row - row);
+      read_rows(row, count, values, mask);
+      for (int r = 0; r < count; ++r) {
+        const std::span<double> heights_m(&values[static_cast<std::size_t>(r) * width], width);
+        std::uint8_t* known = &mask[static_cast<std::size_t>(r) * width];
+        for (std::size_t c = 0; c < width; ++c) {
+          if (options_.nodata && heights_m[c] == *options_.nodata) known[c] = 0;
+          if (known[c]) heights_m[c] = metres(heights_m[c], c, row + r);
+        }
+        put(source_.south_up ? source_.rows - 1 - (row + r) : row + r, heights_m, known);
+        if (!has_mask_) std::fill(known, known + width, std::uint8_t{255});
+      }
+    }
+  }
+
  private:
   void read_rows(int row, int count, std::vector<double>& values, std::vector<std::uint8_t>& mask) {
     CPLPushErrorHandler(CPLQuietErrorHandler);
@@ -323,9 +351,81 @@ void measure_cells(const Dem& dem, SampleGrid& grid) {
   }
 }
 
+/// The frame around the raster's centre.
+void make_frame(const Source& first, const DemOptions& options, Dem& dem) {
+  FrameDescription frame;
+  const OGRSpatialReference* crs = first.dataset->GetSpatialRef();
+  if (crs && !crs->IsEmpty()) {
+    char* text = nullptr;
+    const char* const wkt_options[] = {"FORMAT=WKT2_2019", nullptr};
+    if (crs->exportToWkt(&text, wkt_options) == OGRERR_NONE && text) frame.crs_wkt = text;
+    CPLFree(text);
+  }
+  frame.earth = options.earth.value_or(frame.crs_wkt.empty() ? Earth::kFlat : Earth::kEllipsoid);
+  frame.refraction = options.refraction;
+  frame.geoid_file = options.geoid_file;
+  frame.centre_x = dem.x_of((dem.columns - 1) / 2.0);
+  frame.centre_y = dem.y_of((dem.rows - 1) / 2.0);
+  dem.frame = std::make_shared<const GeoFrame>(frame);
+}
+
+bool on_earth(const Dem& dem) {
+  return dem.frame->description().earth == Earth::kEllipsoid;
+}
+
+/// Name and size of a file; what should be said about it goes to the warnings.
+DemSource describe(const Source& source, Dem& dem) {
+  DemSource described;
+  described.name = std::filesystem::path(source.file).filename().string();
+  VSIStatBufL status;
+  if (VSIStatL(source.file.c_str(), &status) == 0)
+    described.size_bytes = static_cast<std::uint64_t>(status.st_size);
+  if (source.dataset->GetRasterCount() > 1)
+    dem.warnings.push_back(fmt::format("'{}' has {} bands; the first is taken as heights",
+                                       described.name, source.dataset->GetRasterCount()));
+  return described;
+}
+
+[[noreturn]] void refuse_void(const std::string& file) {
+  refuse(file,
+         "all samples are void; heights were expected; is its nodata value declared right? "
+         "(gdalinfo shows it)");
+}
+
+/// Rows of one file straight into the grid. Each call opens the file for itself, so that calls may
+/// run at once.
+/// @return how many heights it gave
+std::uint64_t read_rows_into(GroundGrid& grid, const Dem& dem, const Source& source,
+                             const DemOptions& options, int first_row, int end_row) {
+  Source own = open_source(source.file);
+  own.first_column = source.first_column;
+  own.first_row = source.first_row;
+  HeightReader reader(own, options, on_earth(dem));
+  const bool add_undulation = !dem.frame->description().geoid_file.empty();
+  const GeoFrame::Placer placer(*dem.frame);
+  std::uint64_t known_count = 0;
+  const auto put = [&](int up_row, std::span<double> heights_m, const std::uint8_t* known) {
+    const auto row = static_cast<std::int32_t>(own.first_row + up_row);
+    const auto column = static_cast<std::int32_t>(own.first_column);
+    for (std::size_t c = 0; c < heights_m.size(); ++c) {
+      known_count += known[c] != 0;
+      if (add_undulation && known[c])
+        heights_m[c] +=
+            placer.undulation_m(dem.x_of(column + static_cast<double>(c)), dem.y_of(row));
+    }
+    if (!grid.set_heights(row, column, heights_m, known))
+      refuse(own.file,
+             "reaches too far around the Earth for one frame (heights of 500 km and more); a "
+             "smaller piece was expected; cut it with gdal_translate -projwin");
+  };
+  reader.read_rows_to(first_row, end_row, put);
+  return known_count;
+}
+
 /// Refuses before allocating what will not fit.
-void check_memory(const Dem& dem, const DemOptions& options, const std::string& file) {
-  const double needed = static_cast<double>(dem.columns) * dem.rows * kBytesPerSample;
+void check_memory(const Dem& dem, const DemOptions& options, double bytes_per_sample,
+                  const std::string& file) {
+  const double needed = static_cast<double>(dem.columns) * dem.rows * bytes_per_sample;
   if (options.memory_budget_bytes && needed > static_cast<double>(options.memory_budget_bytes))
     throw Error(ErrorCode::kResource,
                 fmt::format("'{}': {} x {} samples need about {:.1f} GiB, and --memory allows "
@@ -342,22 +442,9 @@ Dem read_dem(const std::vector<std::string>& files, const DemOptions& options,
   std::vector<Source> sources;
   for (const std::string& file : files) sources.push_back(open_source(file));
   lay_out(sources, dem);
-  check_memory(dem, options, files.front());
+  check_memory(dem, options, kBytesPerSample, files.front());
 
-  FrameDescription frame;
-  const OGRSpatialReference* crs = sources.front().dataset->GetSpatialRef();
-  if (crs && !crs->IsEmpty()) {
-    char* text = nullptr;
-    const char* const wkt_options[] = {"FORMAT=WKT2_2019", nullptr};
-    if (crs->exportToWkt(&text, wkt_options) == OGRERR_NONE && text) frame.crs_wkt = text;
-    CPLFree(text);
-  }
-  frame.earth = options.earth.value_or(frame.crs_wkt.empty() ? Earth::kFlat : Earth::kEllipsoid);
-  frame.refraction = options.refraction;
-  frame.geoid_file = options.geoid_file;
-  frame.centre_x = dem.x_of((dem.columns - 1) / 2.0);
-  frame.centre_y = dem.y_of((dem.rows - 1) / 2.0);
-  dem.frame = std::make_shared<const GeoFrame>(frame);
+  make_frame(sources.front(), options, dem);
 
   const std::size_t count =
       static_cast<std::size_t>(dem.columns) * static_cast<std::size_t>(dem.rows);
@@ -365,12 +452,8 @@ Dem read_dem(const std::vector<std::string>& files, const DemOptions& options,
   dem.known.assign(count, 0);
   for (std::size_t i = 0; i < sources.size(); ++i) {
     const Source& source = sources[i];
-    HeightReader reader(source, options, frame.earth == Earth::kEllipsoid);
-    DemSource described;
-    described.name = std::filesystem::path(source.file).filename().string();
-    VSIStatBufL status;
-    if (VSIStatL(source.file.c_str(), &status) == 0)
-      described.size_bytes = static_cast<std::uint64_t>(status.st_size);
+    HeightReader reader(source, options, on_earth(dem));
+    DemSource described = describe(source, dem);
     described.samples = reader.read_into(
         dem,
         [&](double done) {
@@ -378,17 +461,49 @@ Dem read_dem(const std::vector<std::string>& files, const DemOptions& options,
             progress((static_cast<double>(i) + done) / static_cast<double>(sources.size()));
         },
         described.checksum);
-    if (source.dataset->GetRasterCount() > 1)
-      dem.warnings.push_back(fmt::format("'{}' has {} bands; the first is taken as heights",
-                                         described.name, source.dataset->GetRasterCount()));
     dem.height_unit = reader.unit_name();
     dem.sources.push_back(described);
   }
   if (std::find(dem.known.begin(), dem.known.end(), 1) == dem.known.end())
-    refuse(files.front(),
-           "all samples are void; heights were expected; is its nodata value declared right? "
-           "(gdalinfo shows it)");
+    refuse_void(files.front());
   return dem;
+}
+
+Ground read_ground(const std::vector<std::string>& files, const DemOptions& options,
+                   const Progress& progress) {
+  Ground ground;
+  Dem& dem = ground.dem;
+  std::vector<Source> sources;
+  for (const std::string& file : files) sources.push_back(open_source(file));
+  lay_out(sources, dem);
+  check_memory(dem, options, kBytesPerGroundSample, files.front());
+  make_frame(sources.front(), options, dem);
+  ground.grid = GroundGrid(dem.columns, dem.rows, ground_placement(dem));
+  std::uint64_t known = 0;
+  for (const Source& source : sources) {
+    dem.sources.push_back(describe(source, dem));
+    dem.height_unit = HeightReader(source, options, on_earth(dem)).unit_name();
+    const int bands = std::clamp(source.rows / kRowsPerRead, 1, kBandsPerThread * thread_count());
+    // Bands end between the file's own blocks, so that none is read twice.
+    int block_columns = 1, block_rows = 1;
+    source.band->GetBlockSize(&block_columns, &block_rows);
+    const int rows_in_band =
+        (source.rows + bands * block_rows - 1) / (bands * block_rows) * block_rows;
+    const auto count = static_cast<std::size_t>((source.rows + rows_in_band - 1) / rows_in_band);
+    std::vector<std::uint64_t> known_in_band(count);
+    parallel_for(count, [&](std::size_t band) {
+      const int first = static_cast<int>(band) * rows_in_band;
+      known_in_band[band] = read_rows_into(ground.grid, dem, source, options, first,
+                                           std::min(source.rows, first + rows_in_band));
+    });
+    dem.sources.back().samples =
+        std::accumulate(known_in_band.begin(), known_in_band.end(), std::uint64_t{0});
+    known += dem.sources.back().samples;
+    if (progress)
+      progress(static_cast<double>(dem.sources.size()) / static_cast<double>(sources.size()));
+  }
+  if (known == 0) refuse_void(files.front());
+  return ground;
 }
 
 SampleGrid place_samples(const Dem& dem) {

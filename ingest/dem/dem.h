@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/terrain/ground_grid.h"
 #include "core/terrain/sample_grid.h"
 #include "core/threads/progress.h"
 #include "ingest/crs/geo_frame.h"
@@ -61,6 +62,21 @@ struct Dem {
 /// ground has, an unknown unit, or does not fit the others.
 Dem read_dem(const std::vector<std::string>& files, const DemOptions& options,
              const Progress& progress);
+
+/// What a sample takes in memory as Ground: its height, and a share of the output's making.
+inline constexpr double kBytesPerGroundSample = 12;
+
+/// A DEM read straight into the compact surface `grid`.
+struct Ground {
+  Dem dem;  ///< without heights_m and known; sources without checksums
+  GroundGrid grid;
+};
+
+/// Reads and places in one go, on as many threads as allowed, in 4 bytes a sample. The same files
+/// are refused as by read_dem, and DEMs of more than about 5000 km.
+/// Positions on the ellipsoid are interpolated (ground_placement.h).
+Ground read_ground(const std::vector<std::string>& files, const DemOptions& options,
+                   const Progress& progress);
 
 /// Places every sample in the flattened frame, on as many threads as allowed.
 SampleGrid place_samples(const Dem& dem);

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+
+#include "cli/options.h"
+#include "core/geodesy/position.h"
+#include "ingest/dem/dem.h"
+
+namespace scarp {
+
+/// An eye over a DEM.
+struct GroundEye {
+  Position position;  ///< of the frame, on the same normals as the samples
+  MapPoint map;       ///< in the CRS of the data; height above its height datum
+};
+
+/// Places a typed position. Over the data its plan position is between its samples' as they are
+/// placed, and ground is bilinear; outside the data it is placed by the CRS.
+/// @param crs  of the position; empty: the data's
+///
+/// Throws Error{kInput} where the CRS is not known, and where a height above ground is asked for
+/// outside the data or over void ground.
+GroundEye place_eye(const TypedPosition& typed, const std::string& crs, const Ground& ground);
+
+}  // namespace scarp

@@ -1,0 +1,177 @@
+#include "core/terrain/ground_grid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace scarp {
+namespace {
+
+/// Rows begin an odd number of cache lines apart, so that a column does not fall into few sets.
+std::size_t padded_stride(std::int32_t columns) {
+  constexpr std::size_t kSamplesInLine = 64 / sizeof(std::int32_t);
+  const std::size_t lines =
+      (static_cast<std::size_t>(columns) + kSamplesInLine - 1) / kSamplesInLine;
+  return (lines | 1) * kSamplesInLine;
+}
+
+ExplicitPlacement explicit_placement(const SampleGrid& grid) {
+  ExplicitPlacement placement;
+  placement.x_m.reserve(grid.positions.size());
+  placement.y_m.reserve(grid.positions.size());
+  for (const Position& p : grid.positions) {
+    placement.x_m.push_back(p.x_m);
+    placement.y_m.push_back(p.y_m);
+  }
+  return placement;
+}
+
+/// Flattened height at h along the normal of a sample.
+double flattened_height(const BlockPlacement& blocks, std::int32_t column, std::int32_t row,
+                        double h) {
+  return blocks.value(BlockPlacement::kHeight, column, row) +
+         h * blocks.value(BlockPlacement::kLift, column, row) /
+             (1 + h * blocks.value(BlockPlacement::kFall, column, row));
+}
+
+/// The inverse of flattened_height.
+double height_on_normal(const BlockPlacement& blocks, std::int32_t column, std::int32_t row,
+                        double z) {
+  const double rise = z - blocks.value(BlockPlacement::kHeight, column, row);
+  return rise / (blocks.value(BlockPlacement::kLift, column, row) -
+                 rise * blocks.value(BlockPlacement::kFall, column, row));
+}
+
+}  // namespace
+
+GroundGrid::GroundGrid(std::int32_t columns, std::int32_t rows, Placement placement)
+    : columns_(columns),
+      rows_(rows),
+      stride_(padded_stride(columns)),
+      steps_(stride_ * static_cast<std::size_t>(rows), kVoid),
+      placement_(std::move(placement)) {}
+
+GroundGrid::GroundGrid(const SampleGrid& grid)
+    : GroundGrid(grid.columns, grid.rows, explicit_placement(grid)) {
+  for (std::int32_t row = 0; row < rows_; ++row)
+    for (std::int32_t column = 0; column < columns_; ++column)
+      if (grid.is_known(column, row)) set_z(column, row, grid.at(column, row).z_m);
+}
+
+Position GroundGrid::at(std::int32_t column, std::int32_t row) const {
+  const std::int32_t steps = steps_[index(column, row)];
+  const double z = steps == kVoid ? 0 : steps * kLatticeStepM;
+  if (const auto* separable = std::get_if<SeparablePlacement>(&placement_))
+    return {separable->x_of_column_m[static_cast<std::size_t>(column)],
+            separable->y_of_row_m[static_cast<std::size_t>(row)], z};
+  if (const auto* blocks = std::get_if<BlockPlacement>(&placement_))
+    return {round_to_lattice(blocks->value(BlockPlacement::kX, column, row) +
+                             blocks->value(BlockPlacement::kTiltX, column, row) * z),
+            round_to_lattice(blocks->value(BlockPlacement::kY, column, row) +
+                             blocks->value(BlockPlacement::kTiltY, column, row) * z),
+            z};
+  const auto& own = std::get<ExplicitPlacement>(placement_);
+  const std::size_t i = static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
+                        static_cast<std::size_t>(column);
+  return {own.x_m[i], own.y_m[i], z};
+}
+
+Position GroundGrid::raised(std::int32_t column, std::int32_t row, double height_m) const {
+  assert(is_known(column, row));
+  Position p = at(column, row);
+  if (height_m == 0) return p;
+  const auto* blocks = std::get_if<BlockPlacement>(&placement_);
+  if (!blocks) {
+    p.z_m = round_to_lattice(p.z_m + height_m);
+    return p;
+  }
+  const double z = round_to_lattice(flattened_height(
+      *blocks, column, row, height_on_normal(*blocks, column, row, p.z_m) + height_m));
+  return {round_to_lattice(blocks->value(BlockPlacement::kX, column, row) +
+                           blocks->value(BlockPlacement::kTiltX, column, row) * z),
+          round_to_lattice(blocks->value(BlockPlacement::kY, column, row) +
+                           blocks->value(BlockPlacement::kTiltY, column, row) * z),
+          z};
+}
+
+Position GroundGrid::place(double column, double row, double height_m) const {
+  const auto c = static_cast<std::int32_t>(column), r = static_cast<std::int32_t>(row);
+  const double right = column - c, below = row - r;
+  if (const auto* blocks = std::get_if<BlockPlacement>(&placement_)) {
+    const auto value = [&](BlockPlacement::Quantity quantity) {
+      return BlockPlacement::Along(*blocks, quantity, c, r, below)
+          .at(blocks->local(c) + right * (2.0 / blocks->side));
+    };
+    const double z =
+        value(BlockPlacement::kHeight) +
+        height_m * value(BlockPlacement::kLift) / (1 + height_m * value(BlockPlacement::kFall));
+    return round_to_lattice(Position{value(BlockPlacement::kX) + value(BlockPlacement::kTiltX) * z,
+                                     value(BlockPlacement::kY) + value(BlockPlacement::kTiltY) * z,
+                                     z});
+  }
+  const std::int32_t next_c = right > 0 ? c + 1 : c, next_r = below > 0 ? r + 1 : r;
+  const Position nw = at(c, r), ne = at(next_c, r), sw = at(c, next_r), se = at(next_c, next_r);
+  const auto between = [&](double Position::*axis) {
+    const double north = nw.*axis + right * (ne.*axis - nw.*axis);
+    const double south = sw.*axis + right * (se.*axis - sw.*axis);
+    return north + below * (south - north);
+  };
+  return round_to_lattice(Position{between(&Position::x_m), between(&Position::y_m), height_m});
+}
+
+double GroundGrid::height_m(std::int32_t column, std::int32_t row) const {
+  assert(is_known(column, row));
+  const double z = steps_[index(column, row)] * kLatticeStepM;
+  const auto* blocks = std::get_if<BlockPlacement>(&placement_);
+  return blocks ? height_on_normal(*blocks, column, row, z) : z;
+}
+
+double GroundGrid::height_above_ground_m(std::int32_t column, std::int32_t row, double z_m) const {
+  assert(is_known(column, row));
+  const double ground_m = steps_[index(column, row)] * kLatticeStepM;
+  const auto* blocks = std::get_if<BlockPlacement>(&placement_);
+  if (!blocks) return z_m - ground_m;
+  return height_on_normal(*blocks, column, row, z_m) -
+         height_on_normal(*blocks, column, row, ground_m);
+}
+
+void GroundGrid::set_z(std::int32_t column, std::int32_t row, double z_m) {
+  assert(std::abs(z_m) < kReachZ_m);
+  steps_[index(column, row)] = static_cast<std::int32_t>(std::nearbyint(z_m / kLatticeStepM));
+}
+
+bool GroundGrid::set_heights(std::int32_t row, std::int32_t first_column,
+                             std::span<const double> heights_m, const std::uint8_t* known) {
+  assert(first_column >= 0 &&
+         first_column + static_cast<std::int64_t>(heights_m.size()) <= columns_);
+  std::int32_t* to = &steps_[index(0, row)] + first_column;
+  const auto* blocks = std::get_if<BlockPlacement>(&placement_);
+  bool within = true;
+  const auto set = [&](std::size_t i, double z) {
+    if (!known[i]) return;
+    const bool reached = std::abs(z) < kReachZ_m - 1;
+    within = within && reached;
+    if (reached) to[i] = static_cast<std::int32_t>(round_to_lattice(z) * (1 / kLatticeStepM));
+  };
+  if (!blocks) {
+    for (std::size_t i = 0; i < heights_m.size(); ++i) set(i, heights_m[i]);
+    return within;
+  }
+  for (std::size_t i = 0; i < heights_m.size();) {
+    const std::int32_t column = first_column + static_cast<std::int32_t>(i);
+    const BlockPlacement::Along height(*blocks, BlockPlacement::kHeight, column, row),
+        lift(*blocks, BlockPlacement::kLift, column, row),
+        fall(*blocks, BlockPlacement::kFall, column, row);
+    const std::size_t end = std::min(
+        heights_m.size(), i + static_cast<std::size_t>(blocks->side - column % blocks->side));
+    double u = blocks->local(column);
+    const double step = 2.0 / blocks->side;
+    for (; i < end; ++i, u += step) {
+      const double h = heights_m[i];
+      set(i, height.at(u) + h * lift.at(u) / (1 + h * fall.at(u)));
+    }
+  }
+  return within;
+}
+
+}  // namespace scarp

@@ -1,0 +1,253 @@
+#include "core/viewshed/grid_sight.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <utility>
+
+#include "core/geodesy/predicates.h"
+#include "core/threads/parallel_for.h"
+
+namespace scarp {
+namespace {
+
+enum class Meeting { kNone, kBlocked, kVoid };
+
+bool same_plan(const Position& a, const Position& b) {
+  return a.x_m == b.x_m && a.y_m == b.y_m;
+}
+
+/// Is p, known to lie on the line through a and b in the plane, strictly between them?
+bool strictly_between(const Position& a, const Position& b, const Position& p) {
+  const bool along_x = a.x_m != b.x_m;
+  const double from = along_x ? a.x_m : a.y_m, to = along_x ? b.x_m : b.y_m;
+  const double at = along_x ? p.x_m : p.y_m;
+  return std::min(from, to) < at && at < std::max(from, to);
+}
+
+/// A sample against the open segment eye - target that passes exactly over or beside it.
+/// @param side  orient2d(eye, target, sample)
+Meeting meet_sample(const Position& eye, const Position& target, const Position& sample, int side,
+                    bool known) {
+  if (side != 0 || !strictly_between(eye, target, sample)) return Meeting::kNone;
+  if (!known) return Meeting::kVoid;
+  return above_line(eye, target, sample) > 0 ? Meeting::kBlocked : Meeting::kNone;
+}
+
+/// The inside of the grid segment u - v against the open segment eye - target.
+Meeting meet_inside(const Position& eye, const Position& target, const Position& u, int u_side,
+                    bool u_known, const Position& v, int v_side, bool v_known) {
+  if (u_side * v_side >= 0) return Meeting::kNone;
+  if (orient2d(u, v, eye) * orient2d(u, v, target) >= 0) return Meeting::kNone;
+  if (!u_known || !v_known) return Meeting::kVoid;
+  // Where the two cross, the ground is above the sight line when v lies above the plane through
+  // the sight line and u.
+  return orient3d(eye, target, u, v) * u_side > 0 ? Meeting::kBlocked : Meeting::kNone;
+}
+
+Sight worse(Sight sight, Meeting meeting) {
+  if (meeting == Meeting::kBlocked) return Sight::kHidden;
+  if (meeting == Meeting::kVoid && sight == Sight::kVisible) return Sight::kUnknown;
+  return sight;
+}
+
+/// A vertical segment with its lower end at low, against the segment u - v, ends included.
+Meeting meet_standing(const Position& low, const Position& u, bool u_known, const Position& v,
+                      bool v_known) {
+  for (const auto& [p, known] : {std::pair(u, u_known), std::pair(v, v_known)})
+    if (same_plan(p, low))
+      return !known ? Meeting::kVoid : p.z_m > low.z_m ? Meeting::kBlocked : Meeting::kNone;
+  if (same_plan(u, v) || orient2d(u, v, low) != 0 || !strictly_between(u, v, low))
+    return Meeting::kNone;
+  if (!u_known || !v_known) return Meeting::kVoid;
+  return above_line(u, v, low) < 0 ? Meeting::kBlocked : Meeting::kNone;
+}
+
+}  // namespace
+
+/// A segment on its way over the grid lines that it crosses: columns or rows.
+struct GridSight::Walk {
+  const GridSight& sight;
+  Position target;
+  bool over_columns = true;
+  std::int32_t lines = 0, samples = 0;  ///< grid lines, and samples on each
+  int upper_side =
+      1;  ///< side of the segment, as orient2d has it, where a line's first samples lie
+  double eye_line = 0, target_line = 0;
+  double eye_sample = 0, samples_per_line = 0;
+
+  Position at(std::int32_t line, std::int32_t i) const {
+    return over_columns ? sight.grid_.at(line, i) : sight.grid_.at(i, line);
+  }
+  bool is_known(std::int32_t line, std::int32_t i) const {
+    return over_columns ? sight.grid_.is_known(line, i) : sight.grid_.is_known(i, line);
+  }
+  int side(const Position& p) const { return orient2d(sight.eye_, target, p); }
+
+  std::int32_t guess(std::int32_t line) const {
+    const double at = eye_sample + (line - eye_line) * samples_per_line;
+    return static_cast<std::int32_t>(std::clamp(std::floor(at), -1.0, samples - 1.0));
+  }
+  /// The last sample of a line that is not beyond the segment; -1 where all are.
+  std::int32_t last_before(std::int32_t line, std::int32_t from) const {
+    std::int32_t i = std::clamp(from, -1, samples - 1);
+    while (i + 1 < samples && upper_side * side(at(line, i + 1)) >= 0) ++i;
+    while (i >= 0 && upper_side * side(at(line, i)) < 0) --i;
+    return i;
+  }
+  Meeting meet_on_line(std::int32_t line, std::int32_t i) const {
+    if (i < 0) return Meeting::kNone;
+    const Position u = at(line, i);
+    const int u_side = side(u);
+    if (u_side == 0 || i + 1 == samples)
+      return meet_sample(sight.eye_, target, u, u_side, is_known(line, i));
+    const Position v = at(line, i + 1);
+    return meet_inside(sight.eye_, target, u, u_side, is_known(line, i), v, side(v),
+                       is_known(line, i + 1));
+  }
+  Meeting meet_between(std::int32_t line, std::int32_t next, std::int32_t i) const {
+    const Position u = at(line, i), v = at(next, i);
+    return meet_inside(sight.eye_, target, u, side(u), is_known(line, i), v, side(v),
+                       is_known(next, i));
+  }
+};
+
+GridSight::GridSight(const GroundGrid& grid, const Position& eye)
+    : grid_(grid), eye_(eye), frame_(plan_frame(grid, eye)) {}
+
+bool GridSight::runs_across(const Position& target) const {
+  return std::abs(frame_.across(target.x_m, target.y_m)) >=
+         std::abs(frame_.down(target.x_m, target.y_m));
+}
+
+GridSight::Walk GridSight::start_walk(const Position& target, std::int32_t column, std::int32_t row,
+                                      bool over_columns) const {
+  const double across = frame_.across(target.x_m, target.y_m);
+  const double down = frame_.down(target.x_m, target.y_m);
+  Walk walk{*this, target};
+  walk.over_columns = over_columns;
+  walk.lines = walk.over_columns ? grid_.columns() : grid_.rows();
+  walk.samples = walk.over_columns ? grid_.rows() : grid_.columns();
+  // Looking east or north, the first samples of a line (north, west) are on the left.
+  walk.upper_side = walk.over_columns ? (across > 0 ? 1 : -1) : (down < 0 ? 1 : -1);
+  walk.eye_line = walk.over_columns ? frame_.eye_column : frame_.eye_row;
+  walk.eye_sample = walk.over_columns ? frame_.eye_row : frame_.eye_column;
+  walk.target_line = walk.over_columns ? column : row;
+  const double target_sample = walk.over_columns ? row : column;
+  const double run = walk.target_line - walk.eye_line;
+  walk.samples_per_line = std::abs(run) > 0.5 ? (target_sample - walk.eye_sample) / run : 0;
+  return walk;
+}
+
+Sight GridSight::walk_lines(const Walk& walk, std::int32_t first_line,
+                            std::int32_t last_line) const {
+  Sight sight = Sight::kVisible;
+  const std::int32_t step = first_line <= last_line ? 1 : -1;
+  std::int32_t before = walk.last_before(first_line, walk.guess(first_line));
+  for (std::int32_t line = first_line;; line += step) {
+    sight = worse(sight, walk.meet_on_line(line, before));
+    if (sight == Sight::kHidden || line == last_line) return sight;
+    const std::int32_t next = line + step;
+    const std::int32_t after = walk.last_before(
+        next, before + static_cast<std::int32_t>(std::lround(step * walk.samples_per_line)));
+    for (std::int32_t i = std::min(before, after) + 1; i <= std::max(before, after); ++i) {
+      sight = worse(sight, walk.meet_between(line, next, i));
+      if (sight == Sight::kHidden) return sight;
+    }
+    before = after;
+  }
+}
+
+Sight GridSight::judge(const Position& target, std::int32_t column, std::int32_t row) const {
+  if (same_plan(eye_, target)) return judge_vertical(target);
+  const Walk walk = start_walk(target, column, row, runs_across(target));
+  // Lines that the segment does not reach do no harm: each meeting is tested by itself. Two more
+  // to each side hold for an eye that is only estimated, and for a target off its line.
+  constexpr double kMore = 2;
+  const auto line = [&](double at) {
+    return static_cast<std::int32_t>(std::clamp(at, 0.0, walk.lines - 1.0));
+  };
+  const std::int32_t low = line(std::floor(std::min(walk.eye_line, walk.target_line)) - kMore);
+  const std::int32_t high = line(std::ceil(std::max(walk.eye_line, walk.target_line)) + kMore);
+  // From the target to the eye.
+  return walk.target_line > walk.eye_line ? walk_lines(walk, high, low)
+                                          : walk_lines(walk, low, high);
+}
+
+bool GridSight::is_blocked_between(const Position& target, std::int32_t column, std::int32_t row,
+                                   bool over_columns, std::int32_t first_line,
+                                   std::int32_t last_line) const {
+  if (same_plan(eye_, target)) return judge_vertical(target) == Sight::kHidden;
+  const Walk walk = start_walk(target, column, row, over_columns);
+  return walk_lines(walk, std::clamp(first_line, 0, walk.lines - 1),
+                    std::clamp(last_line, 0, walk.lines - 1)) == Sight::kHidden;
+}
+
+Sight GridSight::judge_vertical(const Position& target) const {
+  const Position& low = eye_.z_m < target.z_m ? eye_ : target;
+  Sight sight = Sight::kVisible;
+  constexpr double kMore = 2;
+  const auto within = [](double at, std::int32_t count) {
+    return static_cast<std::int32_t>(std::clamp(at, 0.0, count - 1.0));
+  };
+  const std::int32_t west = within(frame_.eye_column - kMore, grid_.columns());
+  const std::int32_t east = within(frame_.eye_column + kMore, grid_.columns());
+  const std::int32_t north = within(frame_.eye_row - kMore, grid_.rows());
+  const std::int32_t south = within(frame_.eye_row + kMore, grid_.rows());
+  const auto meet = [&](std::int32_t c, std::int32_t r, std::int32_t to_c, std::int32_t to_r) {
+    sight = worse(sight, meet_standing(low, grid_.at(c, r), grid_.is_known(c, r),
+                                       grid_.at(to_c, to_r), grid_.is_known(to_c, to_r)));
+  };
+  for (std::int32_t r = north; r <= south; ++r) {
+    for (std::int32_t c = west; c <= east; ++c) {
+      if (c < east) meet(c, r, c + 1, r);
+      if (r < south) meet(c, r, c, r + 1);
+    }
+  }
+  return sight;
+}
+
+Sight sight_by_every_segment(const GroundGrid& grid, const Position& eye, const Position& target) {
+  Sight sight = Sight::kVisible;
+  const bool vertical = same_plan(eye, target);
+  const Position& low = eye.z_m < target.z_m ? eye : target;
+  const auto meet = [&](std::int32_t c, std::int32_t r, std::int32_t to_c, std::int32_t to_r) {
+    if (to_c >= grid.columns() || to_r >= grid.rows()) return;
+    const Position u = grid.at(c, r), v = grid.at(to_c, to_r);
+    const bool u_known = grid.is_known(c, r), v_known = grid.is_known(to_c, to_r);
+    if (vertical) {
+      sight = worse(sight, meet_standing(low, u, u_known, v, v_known));
+      return;
+    }
+    const int u_side = orient2d(eye, target, u), v_side = orient2d(eye, target, v);
+    sight = worse(sight, meet_sample(eye, target, u, u_side, u_known));
+    sight = worse(sight, meet_sample(eye, target, v, v_side, v_known));
+    sight = worse(sight, meet_inside(eye, target, u, u_side, u_known, v, v_side, v_known));
+  };
+  for (std::int32_t r = 0; r < grid.rows(); ++r) {
+    for (std::int32_t c = 0; c < grid.columns(); ++c) {
+      meet(c, r, c + 1, r);
+      meet(c, r, c, r + 1);
+    }
+  }
+  return sight;
+}
+
+void exhaustive_viewshed(const GroundGrid& grid, const Position& eye, double target_height_m,
+                         std::span<Sight> sight) {
+  const auto columns = static_cast<std::size_t>(grid.columns());
+  assert(sight.size() == columns * static_cast<std::size_t>(grid.rows()));
+  const GridSight judge(grid, eye);
+  parallel_for(static_cast<std::size_t>(grid.rows()), [&](std::size_t r) {
+    const auto row = static_cast<std::int32_t>(r);
+    for (std::size_t c = 0; c < columns; ++c) {
+      const auto column = static_cast<std::int32_t>(c);
+      sight[r * columns + c] =
+          grid.is_known(column, row)
+              ? judge.judge(grid.raised(column, row, target_height_m), column, row)
+              : Sight::kUnknown;
+    }
+  });
+}
+
+}  // namespace scarp

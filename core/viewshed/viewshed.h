@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/geodesy/earth_frame.h"
+#include "core/terrain/ground_grid.h"
+#include "core/viewshed/grid_sight.h"
+#include "core/viewshed/part_sweep.h"
+#include "core/viewshed/view_limits.h"
+
+namespace scarp {
+
+/// One eye and what it looks for.
+struct ViewshedEye {
+  Position position;
+  double target_height_m = 0;  ///< along the normal
+  ViewLimits limits;           ///< targets outside count as hidden
+};
+
+/// What one eye sees within its limits, exactly what GridSight judges.
+/// @param earth        of the grid's frame; nothing where it is flat
+/// @param sight[out]   [rows * columns]; only the window returned is written
+/// @return the window within reach; outside it nothing is within the limits
+/// Cost: see PartSweep; with limits besides distance, a bearing for each sample seen.
+SampleWindow view_from(const GroundGrid& grid, const std::optional<EarthFrame>& earth,
+                       const ViewshedEye& eye, std::span<Sight> sight,
+                       SweepCounts* counts = nullptr);
+
+/// Seen by any of the eyes so far: visible where one sees it, otherwise unknown where that
+/// holds for one.
+class AnyEye {
+ public:
+  /// Nothing seen yet: hidden, and unknown where void.
+  explicit AnyEye(const GroundGrid& grid);
+  void add(const SampleWindow& window, std::span<const Sight> sight);
+  std::span<const Sight> sight() const { return sight_; }
+
+ private:
+  std::size_t columns_;
+  std::vector<Sight> sight_;
+};
+
+/// By how many of the eyes so far a sample is seen for certain.
+class EyeCount {
+ public:
+  static constexpr std::uint32_t kVoid = 0xFFFFFFFF;  ///< where the sample is void
+
+  explicit EyeCount(const GroundGrid& grid);
+  void add(const SampleWindow& window, std::span<const Sight> sight);
+  std::span<const std::uint32_t> counts() const { return counts_; }
+
+ private:
+  std::size_t columns_;
+  std::vector<std::uint32_t> counts_;
+};
+
+}  // namespace scarp

@@ -1,0 +1,146 @@
+#include <gtest/gtest.h>
+
+#include <random>
+#include <vector>
+
+#include "core/geodesy/predicates.h"
+#include "core/threads/parallel_for.h"
+#include "core/viewshed/grid_sight.h"
+#include "core/viewshed/part_sweep.h"
+#include "tests/core/viewshed/random_ground.h"
+
+namespace scarp {
+namespace {
+
+using test::GroundRecipe;
+using test::random_ground;
+using test::Relief;
+
+std::vector<Sight> judged(const GroundGrid& grid, const Position& eye, double target_m) {
+  std::vector<Sight> sight(static_cast<std::size_t>(grid.columns() * grid.rows()));
+  exhaustive_viewshed(grid, eye, target_m, sight);
+  return sight;
+}
+
+std::vector<Sight> swept(const GroundGrid& grid, const Position& eye, double target_m,
+                         SweepCounts* counts = nullptr) {
+  std::vector<Sight> sight(static_cast<std::size_t>(grid.columns() * grid.rows()));
+  const SweepCounts c = sweep_viewshed(grid, eye, target_m, whole_window(grid), sight);
+  if (counts) *counts = c;
+  return sight;
+}
+
+/// Eyes on samples, on grid lines, between, beside and far outside, at heights from under ground
+/// to 10 km.
+std::vector<Position> eyes_for(const GroundGrid& grid, std::mt19937& random, int count) {
+  std::uniform_int_distribution<std::int32_t> column(0, grid.columns() - 2),
+      row(0, grid.rows() - 2);
+  std::uniform_int_distribution<int> kind(0, 5), height(0, 5);
+  std::uniform_real_distribution<double> unit(0, 1);
+  constexpr double kHeights[] = {2, 100, 10'000, -5, 0, 0.5};
+  std::vector<Position> eyes;
+  for (int i = 0; i < count; ++i) {
+    const std::int32_t c = column(random), r = row(random);
+    const Position a = grid.at(c, r), b = grid.at(c + 1, r), d = grid.at(c, r + 1);
+    Position eye = a;
+    double f = unit(random), g = unit(random);
+    switch (kind(random)) {
+      case 0:
+        f = g = 0;
+        break;
+      case 1:
+        g = 0;
+        break;
+      case 2:
+        f = 0;
+        break;
+      case 3:
+        f += (unit(random) - 0.5) * 4 * grid.columns();
+        g += (unit(random) - 0.5) * 4 * grid.rows();
+        break;
+      case 4:
+        f = g = 0.5;
+        break;
+      default:
+        break;
+    }
+    eye.x_m += f * (b.x_m - a.x_m) + g * (d.x_m - a.x_m);
+    eye.y_m += f * (b.y_m - a.y_m) + g * (d.y_m - a.y_m);
+    eye.z_m += kHeights[height(random)];
+    eyes.push_back(round_to_lattice(eye));
+  }
+  return eyes;
+}
+
+std::vector<GroundRecipe> recipes() {
+  std::vector<GroundRecipe> all;
+  for (int relief = 0; relief < static_cast<int>(Relief::kCount); ++relief)
+    for (const double bend : {0.0, 1.5})
+      for (const double void_share : {0.0, 0.08})
+        all.push_back({static_cast<Relief>(relief), 24, 20, bend, void_share,
+                       static_cast<std::uint32_t>(relief + 1)});
+  return all;
+}
+
+TEST(GridSightTest, WalkingFindsWhatTestingEverySegmentFinds) {
+  for (const GroundRecipe& recipe : recipes()) {
+    const GroundGrid grid = random_ground(recipe);
+    std::mt19937 random(recipe.seed);
+    for (const Position& eye : eyes_for(grid, random, 4)) {
+      const GridSight judge(grid, eye);
+      for (const double target_m : {0.0, 3.0}) {
+        for (std::int32_t r = 0; r < grid.rows(); ++r) {
+          for (std::int32_t c = 0; c < grid.columns(); ++c) {
+            if (!grid.is_known(c, r)) continue;
+            const Position target = grid.raised(c, r, target_m);
+            ASSERT_EQ(judge.judge(target, c, r), sight_by_every_segment(grid, eye, target))
+                << "relief " << static_cast<int>(recipe.relief) << " bend " << recipe.bend
+                << " void " << recipe.void_share << " column " << c << " row " << r << " eye "
+                << eye.x_m << ' ' << eye.y_m << ' ' << eye.z_m;
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(SweepViewshed, EqualsTheJudgeOnEveryCell) {
+  for (GroundRecipe recipe : recipes()) {
+    for (const std::int32_t size : {24, 90}) {
+      recipe.columns = size;
+      recipe.rows = size - 7;
+      const GroundGrid grid = random_ground(recipe);
+      std::mt19937 random(recipe.seed);
+      for (const Position& eye : eyes_for(grid, random, size < 50 ? 24 : 6)) {
+        for (const double target_m : {0.0, 3.0}) {
+          const auto expected = judged(grid, eye, target_m), found = swept(grid, eye, target_m);
+          for (std::size_t i = 0; i < expected.size(); ++i)
+            ASSERT_EQ(found[i], expected[i])
+                << "relief " << static_cast<int>(recipe.relief) << " bend " << recipe.bend
+                << " void " << recipe.void_share << " target " << target_m << " column "
+                << i % static_cast<std::size_t>(size) << " row "
+                << i / static_cast<std::size_t>(size) << " eye " << eye.x_m << ' ' << eye.y_m << ' '
+                << eye.z_m;
+        }
+      }
+    }
+  }
+}
+
+TEST(SweepViewshed, DecidesMostByItsBounds) {
+  GroundRecipe recipe{Relief::kSmooth, 300, 280, 0, 0, 3};
+  for (const double bend : {0.0, 2.0}) {
+    recipe.bend = bend;
+    const GroundGrid grid = random_ground(recipe);
+    Position eye = grid.at(140, 120);
+    eye.z_m += 2;
+    SweepCounts counts;
+    swept(grid, eye, 0, &counts);
+    EXPECT_EQ(counts.targets, 300U * 280U);
+    EXPECT_LT(counts.traced_whole, 100U);
+    EXPECT_LT(counts.traced_part, counts.targets / 10);
+  }
+}
+
+}  // namespace
+}  // namespace scarp
