@@ -52,6 +52,12 @@ Normal normal_of(const Tin& tin, const std::array<VertexIndex, 3>& triangle) {
   return {uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx};
 }
 
+/// Steeper than this (83 degrees) is a wall: lit as the flat face that it is, and without a share in
+/// the normals of the ground and roofs that it joins.
+constexpr double kWallSlope = 8;
+
+bool is_wall(const Normal& n) { return std::hypot(n.x, n.y) > kWallSlope * n.z; }
+
 /// Relief colours from lowland to summit, muted so that light and shade stay readable.
 Rgb relief_colour(double share) {
   constexpr std::array<Rgb, 7> kRamp = {{{0.46, 0.59, 0.49},
@@ -115,6 +121,7 @@ class Painter {
     double area = 0, squares = 0;
     for (const auto& triangle : tin_.triangles) {
       const Normal n = normal_of(tin_, triangle);
+      if (is_wall(n)) continue;
       for (const VertexIndex v : triangle) {
         normals_[v].x += n.x;
         normals_[v].y += n.y;
@@ -155,6 +162,8 @@ class Painter {
 
   /// Light above (positive) or below that of flat ground, normals smooth between corners.
   double light(TriangleIndex t, const Place& place) const {
+    const Normal face = normal_of(tin_, tin_.triangles[t]);
+    if (is_wall(face)) return 0.5 * (std::max(lambert(face), 0.0) - kSun.z);
     Normal n;
     for (std::size_t i = 0; i < 3; ++i) {
       const Normal& corner = normals_[tin_.triangles[t][i]];
