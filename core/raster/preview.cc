@@ -52,11 +52,13 @@ Normal normal_of(const Tin& tin, const std::array<VertexIndex, 3>& triangle) {
   return {uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx};
 }
 
-/// Steeper than this (83 degrees) is a wall: lit as the flat face that it is, and without a share in
-/// the normals of the ground and roofs that it joins.
+/// Steeper than this (83 degrees) is a wall: lit as the flat face that it is, and without a share
+/// in the normals of the ground and roofs that it joins.
 constexpr double kWallSlope = 8;
 
-bool is_wall(const Normal& n) { return std::hypot(n.x, n.y) > kWallSlope * n.z; }
+bool is_wall(const Normal& n) {
+  return std::hypot(n.x, n.y) > kWallSlope * n.z;
+}
 
 /// Relief colours from lowland to summit, muted so that light and shade stay readable.
 Rgb relief_colour(double share) {
