@@ -8,19 +8,21 @@ float* BinHistory::begin_line(std::int32_t line, std::int32_t bins) {
   const auto width = static_cast<std::size_t>(bins);
   if (groups_.empty() || groups_.back().bins != bins ||
       groups_.back().lines == kLinesInBlock * kBlocksInGroup) {
-    groups_.push_back({bins, numbers_.size(), 0, lines_.size(), reach_.size()});
+    groups_.push_back(
+        {bins, numbers_.size(), 0,
+         std::make_unique_for_overwrite<float[]>(kLinesInBlock * kBlocksInGroup * width),
+         reach_.size()});
     reach_.resize(reach_.size() + (1 + kBlocksInGroup) * width, kNoGround);
   }
-  ++groups_.back().lines;
+  Group& group = groups_.back();
   numbers_.push_back(line);
-  lines_.resize(lines_.size() + width);
-  return lines_.data() + (lines_.size() - width);
+  return &group.values[group.lines++ * width];
 }
 
 void BinHistory::end_line() {
   const Group& group = groups_.back();
   const auto width = static_cast<std::size_t>(group.bins);
-  const float* line = lines_.data() + (lines_.size() - width);
+  const float* line = &group.values[(group.lines - 1) * width];
   const std::size_t block = (group.lines - 1) / kLinesInBlock;
   take_maximum(width, line, &reach_[group.reach]);
   take_maximum(width, line, &reach_[group.reach + (1 + block) * width]);

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 namespace scarp {
@@ -31,8 +32,7 @@ class BinHistory {
         const std::size_t end =
             first + kLinesInBlock < group.lines ? first + kLinesInBlock : group.lines;
         for (std::size_t k = end; k-- > first;)
-          if (lines_[group.lines_begin + k * width + b] >= s && blocks(numbers_[group.first + k]))
-            return true;
+          if (group.values[k * width + b] >= s && blocks(numbers_[group.first + k])) return true;
       }
     }
     return false;
@@ -44,14 +44,14 @@ class BinHistory {
   /// Up to 64 lines with equal bins.
   struct Group {
     std::int32_t bins;
-    std::size_t first, lines;  ///< in numbers_
-    std::size_t lines_begin;   ///< in lines_
-    std::size_t reach;         ///< in reach_: of the group, then of each block
+    std::size_t first, lines;         ///< in numbers_
+    std::unique_ptr<float[]> values;  ///< [64 lines * bins]
+    std::size_t reach;                ///< in reach_: of the group, then of each block
   };
 
   std::vector<Group> groups_;
   std::vector<std::int32_t> numbers_;
-  std::vector<float> lines_, reach_;
+  std::vector<float> reach_;
 };
 
 }  // namespace scarp

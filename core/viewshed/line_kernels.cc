@@ -110,6 +110,41 @@ void take_level_picture(std::size_t count, double forwards, const double* __rest
 }
 
 SCARP_FOR_EACH_TARGET
+float take_rises(std::size_t count, const float* __restrict t, const float* __restrict s,
+                 const std::uint8_t* __restrict is_void, float* __restrict steep) {
+  if (count == 0) return kAnyGround;
+  steep[count - 1] = 0;
+  float closest = kAnyGround;
+  const auto rise = [&](std::size_t i) {
+    const float difference = std::abs(s[i + 1] - s[i]);
+    return (is_void[i] | is_void[i + 1]) != 0 ? 0.0F : difference;
+  };
+  for (std::size_t i = 0; i + 1 < count; ++i) {
+    const float spacing = t[i + 1] - t[i];
+    closest = spacing < closest ? spacing : closest;
+  }
+  for (std::size_t i = 1; i + 2 < count; ++i)
+    steep[i] = std::max(rise(i - 1), std::max(rise(i), rise(i + 1)));
+  if (count > 1) {
+    steep[0] = count > 2 ? std::max(rise(0), rise(1)) : rise(0);
+    if (count > 2) steep[count - 2] = std::max(rise(count - 3), rise(count - 2));
+  }
+  return closest;
+}
+
+SCARP_FOR_EACH_TARGET
+void even_places(std::size_t count, float per_edge, float begin, float* __restrict place) {
+  for (std::size_t e = 0; e < count; ++e)
+    place[e] = static_cast<float>(static_cast<std::int32_t>(e)) * per_edge + begin;
+}
+
+SCARP_FOR_EACH_TARGET
+void shift_places(std::size_t count, const float* __restrict place, float by,
+                  float* __restrict shifted) {
+  for (std::size_t e = 0; e < count; ++e) shifted[e] = place[e] + by;
+}
+
+SCARP_FOR_EACH_TARGET
 void edge_bounds(std::size_t edges, const float* __restrict place, const float* __restrict s,
                  const float* __restrict steep, float per_rise, float slope_margin,
                  std::int32_t* __restrict before, float* __restrict this_s,

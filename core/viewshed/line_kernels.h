@@ -47,6 +47,16 @@ void take_level_picture(std::size_t count, double forwards, const double* sidewa
                         const double* z_m, const std::uint8_t* is_void, double eye_z_m,
                         double low_tangent, double bins_per_tangent, float* t, float* s);
 
+/// Rises of s along a polyline: steep[i] is the greatest of the segment after i and its two
+/// neighbours, without those that have a void end.
+/// @return the least distance of neighbours in t
+float take_rises(std::size_t count, const float* t, const float* s, const std::uint8_t* is_void,
+                 float* steep);
+
+/// place[e] = e * per_edge + begin.
+void even_places(std::size_t count, float per_edge, float begin, float* place);
+void shift_places(std::size_t count, const float* place, float by, float* shifted);
+
 /// Bounds of a polyline at the edges between bins.
 /// @param place      [edges] sample before each edge, and how far the edge is towards the next
 /// @param s, steep   of the polyline's samples

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cassert>
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <optional>
 
 #include "core/geodesy/predicates.h"
 #include "core/threads/parallel_for.h"
@@ -104,6 +106,59 @@ struct PartSweep::Line {
   std::int32_t count() const { return static_cast<std::int32_t>(t.size()); }
 };
 
+/// Results of a part that sweeps over columns, gathered so that rows of the raster are written a
+/// cache line at a time.
+class ColumnTile {
+ public:
+  static constexpr std::size_t kStride = 64;
+
+  explicit ColumnTile(std::int32_t rows)
+      : sight_(static_cast<std::size_t>(rows) * kStride, Sight::kUnknown),
+        marks_(static_cast<std::size_t>(rows), 0) {}
+
+  /// Where a column's results go, kStride apart.
+  Sight* column(std::int32_t column) { return &sight_[static_cast<std::size_t>(column) % kStride]; }
+
+  /// Rows [first, last] of a column are of the part.
+  void mark(std::int32_t column, std::int32_t first, std::int32_t last) {
+    const std::uint64_t bit = std::uint64_t{1} << (static_cast<std::size_t>(column) % kStride);
+    for (auto r = static_cast<std::size_t>(first); r <= static_cast<std::size_t>(last); ++r)
+      marks_[r] |= bit;
+    first_row_ = std::min(first_row_, first);
+    last_row_ = std::max(last_row_, last);
+  }
+
+  static bool is_last_in_tile(std::int32_t column, std::int32_t outwards) {
+    const std::size_t at = static_cast<std::size_t>(column) % kStride;
+    return outwards > 0 ? at == kStride - 1 : at == 0;
+  }
+
+  /// Writes what is marked of the tile that a column belongs to, and begins anew.
+  void flush(std::int32_t column, std::int32_t columns, std::span<Sight> result) {
+    const std::size_t begin = static_cast<std::size_t>(column) / kStride * kStride;
+    for (std::int32_t row = first_row_; row <= last_row_; ++row) {
+      const auto r = static_cast<std::size_t>(row);
+      const Sight* from = &sight_[r * kStride];
+      Sight* to = &result[r * static_cast<std::size_t>(columns) + begin];
+      // Mostly one run of columns; where rows bend there may be more.
+      for (std::uint64_t marks = marks_[r]; marks != 0;) {
+        const int first = std::countr_zero(marks);
+        const int length = std::countr_one(marks >> first);
+        std::copy(from + first, from + first + length, to + first);
+        marks = first + length == 64 ? 0 : marks >> (first + length) << (first + length);
+      }
+      marks_[r] = 0;
+    }
+    first_row_ = std::numeric_limits<std::int32_t>::max();
+    last_row_ = -1;
+  }
+
+ private:
+  std::vector<Sight> sight_;
+  std::vector<std::uint64_t> marks_;
+  std::int32_t first_row_ = std::numeric_limits<std::int32_t>::max(), last_row_ = -1;
+};
+
 class PartSweep::Run {
  public:
   Run(const PartSweep& sweep, const SweepPart& part, std::span<Sight> result);
@@ -165,10 +220,10 @@ class PartSweep::Run {
   void take_separable(Line& to, std::size_t count);
   void take_blocks(Line& to, std::size_t count);
   void take_each(Line& to, std::size_t count);
-  bool holds(Line& to);
   void find_edges(Line& to) const;
 
   void decide(const Line& line, const Line* before);
+  std::pair<std::int32_t, std::int32_t> own_range(const Line& line) const;
   void take_targets(const Line& line);
   Sight decide_seen(const Line& line, const Line* before, std::int32_t k, Decision decision);
   bool crosses_before(const Line& before, std::int32_t i, float t) const;
@@ -214,6 +269,7 @@ class PartSweep::Run {
   std::vector<float> this_s_, next_s_, edge_low_, edge_high_, line_low_;
   std::vector<std::int32_t> edge_before_;
   std::vector<Decision> decisions_;
+  std::optional<ColumnTile> tile_;
   SweepCounts counts_;
 };
 
@@ -262,8 +318,14 @@ SweepCounts PartSweep::Run::run() {
     begin = outwards_ > 0 ? std::max<std::int64_t>(begin, 0)
                           : std::min<std::int64_t>(begin, lines_ - 1);
   if (!inside(begin)) return counts_;
-  for (std::int64_t line = begin; (border - line) * outwards_ > 0; line += outwards_)
-    sweep_line(static_cast<std::int32_t>(line), line == begin);
+  if (over_columns_) tile_.emplace(samples_);
+  for (std::int64_t at = begin; (border - at) * outwards_ > 0; at += outwards_) {
+    const auto line = static_cast<std::int32_t>(at);
+    sweep_line(line, at == begin);
+    const bool is_last = at + outwards_ == border;
+    if (tile_ && (is_last || ColumnTile::is_last_in_tile(line, outwards_)))
+      tile_->flush(line, grid_.columns(), result_);
+  }
   return counts_;
 }
 
@@ -497,33 +559,14 @@ void PartSweep::Run::fill(Line& to, std::int32_t line) {
   constexpr auto kSpare = static_cast<std::size_t>(3 * kBeyond);
   if (to.t.size() > kSpare && to.t[kSpare] < 0) low_bend_ += kBeyond;
   if (to.t.size() > kSpare && to.t[to.t.size() - 1 - kSpare] > bins) high_bend_ -= kBeyond;
-  if (!holds(to)) bounds_hold_ = false;
   const auto n = to.t.size();
+  to.steep.resize(n);
+  if (take_rises(n, to.t.data(), to.s.data(), to.is_void.data(), to.steep.data()) <
+      kLeastSpacingBins)
+    bounds_hold_ = false;
   to.is_whole =
       bounds_hold_ && !to.has_void && n > 4 && to.t[1] < -slack() && to.t[n - 2] > bins + slack();
   if (to.is_whole) find_edges(to);
-}
-
-/// Takes the rises along a line. @return whether its samples are far enough apart
-bool PartSweep::Run::holds(Line& to) {
-  const std::size_t n = to.t.size();
-  to.steep.resize(n);
-  float closest = kAnyGround;
-  float before = 0;  // the rise of the segment before
-  float own = 0;
-  const auto rise = [&](std::size_t i) {
-    return to.is_void[i] || to.is_void[i + 1] ? 0.0F : std::abs(to.s[i + 1] - to.s[i]);
-  };
-  if (n > 1) own = rise(0);
-  for (std::size_t i = 0; i + 1 < n; ++i) {
-    const float after = i + 2 < n ? rise(i + 1) : 0;
-    to.steep[i] = std::max(before, std::max(own, after));
-    closest = std::min(closest, to.t[i + 1] - to.t[i]);
-    before = own;
-    own = after;
-  }
-  to.steep[n - 1] = 0;
-  return closest >= kLeastSpacingBins;
 }
 
 /// Where the edges between bins fall among the samples of a whole line.
@@ -536,8 +579,7 @@ void PartSweep::Run::find_edges(Line& to) const {
         (static_cast<double>(to.t[n - 1]) - to.t[0]) / static_cast<double>(n - 1);
     const auto per_bin = static_cast<float>(1 / spacing);
     const auto begin = static_cast<float>(-to.t[0] / spacing);
-    for (std::size_t e = 0; e < edges; ++e)
-      to.place[e] = static_cast<float>(static_cast<std::int32_t>(e)) * per_bin + begin;
+    even_places(edges, per_bin, begin, to.place.data());
     return;
   }
   std::size_t j = 0;
@@ -596,12 +638,13 @@ Sight PartSweep::Run::decide_seen(const Line& line, const Line* before, std::int
   const bool raised = target_height_m_ != 0;
   const float t = raised ? target_t_[n] : line.t[n], s = raised ? target_s_[n] : line.s[n];
   if (before && crosses_before(*before, i, t)) return judge(line.number, i);
-  const Position at = target(line.number, i);
-  if (raised && !stands_free(at, position(line.number, i))) return judge(line.number, i);
+  if (raised && !stands_free(target(line.number, i), position(line.number, i)))
+    return judge(line.number, i);
   const auto bins = static_cast<float>(bins_);
-  if (t < -slack() || t > bins + slack()) return judge(line.number, i);
+  if (raised && (t < -slack() || t > bins + slack())) return judge(line.number, i);
   const auto bin = static_cast<std::int32_t>(std::clamp(t, 0.0F, bins - 1));
   if (decision == Decision::kOpen) {
+    const Position at = target(line.number, i);
     ++counts_.traced_part;
     const float least = s - 4 * kSlopeMargin * std::abs(s);
     const bool blocked = history_.any_line(bin, bins_, least, [&](std::int32_t across) {
@@ -617,29 +660,70 @@ Sight PartSweep::Run::decide_seen(const Line& line, const Line* before, std::int
   return some_void_[b] ? judge(line.number, i) : Sight::kVisible;
 }
 
+/// The part's own samples of a line, as indices [first, end). Only near the part's ends does it
+/// take more than t to tell.
+std::pair<std::int32_t, std::int32_t> PartSweep::Run::own_range(const Line& line) const {
+  const auto bins = static_cast<float>(bins_);
+  const auto t = [&](std::int32_t k) { return line.t[static_cast<std::size_t>(k)]; };
+  const auto own = [&](std::int32_t k) {
+    return is_target(line.number, line.first + k) &&
+           ((t(k) >= 1 && t(k) <= bins - 1) ||
+            owns(picture(position(line.number, line.first + k))));
+  };
+  std::int32_t first = 0, end = line.count();
+  while (first < end && (t(first) < -1 || !own(first))) ++first;
+  while (end > first && (t(end - 1) > bins + 1 || !own(end - 1))) --end;
+  return {first, end};
+}
+
 void PartSweep::Run::decide(const Line& line, const Line* before) {
+  const auto [first, end] = own_range(line);
+  if (first == end) return;
+  const auto n = static_cast<std::size_t>(first);
+  const auto count = static_cast<std::size_t>(end - first);
   const bool raised = target_height_m_ != 0;
   if (raised) take_targets(line);
-  const auto bins = static_cast<float>(bins_);
   decisions_.resize(line.t.size());
-  classify(line.t.size(), raised ? target_t_.data() : line.t.data(),
-           raised ? target_s_.data() : line.s.data(), bins_, low_.data(), high_.data(),
-           kSlopeMargin, decisions_.data());
-  for (std::int32_t k = 0; k < line.count(); ++k) {
-    const auto n = static_cast<std::size_t>(k);
-    const float t = line.t[n];
-    if (t < -1 || t > bins + 1 || line.is_void[n]) continue;
-    const std::int32_t i = line.first + k;
-    if (!is_target(line.number, i)) continue;
-    if ((t < 1 || t > bins - 1) && !owns(picture(position(line.number, i)))) continue;
-    ++counts_.targets;
-    Sight& to = result_[result_index(line.number, i)];
-    if (!bounds_hold_)
-      to = judge(line.number, i);
-    else if (decisions_[n] == Decision::kHidden)
-      to = Sight::kHidden;
-    else
-      to = decide_seen(line, before, k, decisions_[n]);
+  classify(count, (raised ? target_t_ : line.t).data() + n,
+           (raised ? target_s_ : line.s).data() + n, bins_, low_.data(), high_.data(), kSlopeMargin,
+           decisions_.data() + n);
+  counts_.targets += count;
+  if (line.has_void || !bounds_hold_) {
+    for (std::int32_t k = first; k < end; ++k) {
+      if (line.is_void[static_cast<std::size_t>(k)])
+        --counts_.targets;
+      else if (!bounds_hold_)
+        decisions_[static_cast<std::size_t>(k)] = Decision::kOpen;
+    }
+  }
+  // Hidden and visible have the same values in both.
+  const auto* sight = reinterpret_cast<const Sight*>(decisions_.data());
+  Sight* to = tile_ ? tile_->column(line.number) +
+                          ColumnTile::kStride * static_cast<std::size_t>(line.first)
+                    : &result_[result_index(line.number, 0)] + line.first;
+  const std::size_t stride = tile_ ? ColumnTile::kStride : 1;
+  if (tile_) {
+    tile_->mark(line.number, line.first + first, line.first + end - 1);
+    for (std::size_t k = n; k < n + count; ++k) to[k * stride] = sight[k];
+  } else {
+    std::copy(sight + n, sight + n + count, to + n);
+  }
+  for (std::size_t k = n; k < n + count; ++k) {
+    // Eight hidden ones at a time.
+    std::uint64_t eight;
+    if (k + sizeof(eight) <= n + count && !line.has_void) {
+      std::memcpy(&eight, &decisions_[k], sizeof(eight));
+      if (eight == 0) {
+        k += sizeof(eight) - 1;
+        continue;
+      }
+    }
+    const auto i = static_cast<std::int32_t>(k);
+    if (line.is_void[k])
+      to[k * stride] = Sight::kUnknown;
+    else if (decisions_[k] != Decision::kHidden)
+      to[k * stride] = bounds_hold_ ? decide_seen(line, before, i, decisions_[k])
+                                    : judge(line.number, line.first + i);
   }
 }
 
@@ -654,22 +738,23 @@ void PartSweep::Run::add_whole(const Line& line, const Line* before) {
   edge_bounds(bins + 1, line.place.data(), line.s.data(), line.steep.data(), per_rise(),
               kSlopeMargin, edge_before_.data(), this_s_.data(), next_s_.data(), edge_low_.data(),
               edge_high_.data());
-  higher_ = line.s;
   const float* place_before = line.place.data();
+  const float* higher = line.s.data();
   if (before) {
     const std::int32_t shift = before->first - line.first;
     place_before_.resize(bins + 1);
-    for (std::size_t e = 0; e <= bins; ++e)
-      place_before_[e] = before->place[e] + static_cast<float>(shift);
+    shift_places(bins + 1, before->place.data(), static_cast<float>(static_cast<double>(shift)),
+                 place_before_.data());
     place_before = place_before_.data();
     const auto last = static_cast<std::int32_t>(n);
     const std::int32_t begin = std::clamp(shift, 0, last);
     const std::int32_t end = std::clamp(shift + before->count(), begin, last);
+    higher_.assign(line.s.begin(), line.s.end());
     std::fill(higher_.begin(), higher_.begin() + begin, kAnyGround);
-    for (std::int32_t i = begin; i < end; ++i)
-      higher_[static_cast<std::size_t>(i)] = std::max(
-          higher_[static_cast<std::size_t>(i)], before->s[static_cast<std::size_t>(i - shift)]);
+    take_maximum(static_cast<std::size_t>(end - begin), before->s.data() + (begin - shift),
+                 higher_.data() + begin);
     std::fill(higher_.begin() + end, higher_.end(), kAnyGround);
+    higher = higher_.data();
     if (place_before[0] < 1 || place_before[bins] > static_cast<float>(n - 2)) {
       add_in_pieces(line, before);
       return;
@@ -678,9 +763,9 @@ void PartSweep::Run::add_whole(const Line& line, const Line* before) {
   // A bin's slack in samples: they are kLeastSpacingBins apart or more.
   const float place_slack = 4 * slack();
   float* up = history_.begin_line(line.number, bins_);
-  if (!bin_bounds(bins, line.place.data(), place_before, place_slack, higher_.data(),
-                  edge_before_.data(), this_s_.data(), next_s_.data(), edge_low_.data(),
-                  edge_high_.data(), up, low_.data(), high_.data()))
+  if (!bin_bounds(bins, line.place.data(), place_before, place_slack, higher, edge_before_.data(),
+                  this_s_.data(), next_s_.data(), edge_low_.data(), edge_high_.data(), up,
+                  low_.data(), high_.data()))
     bounds_hold_ = false;
   history_.end_line();
 }
@@ -832,10 +917,13 @@ SweepCounts sweep_viewshed(const GroundGrid& grid, const Position& eye, double t
   assert(result.size() == columns * static_cast<std::size_t>(grid.rows()));
   const GridSight sight(grid, eye);
   if (window.last_column < window.first_column) return {};
-  for (std::int32_t row = window.first_row; row <= window.last_row; ++row) {
-    const auto begin = result.begin() + static_cast<std::ptrdiff_t>(row) * grid.columns();
-    std::fill(begin + window.first_column, begin + window.last_column + 1, Sight::kUnknown);
-  }
+  parallel_for(
+      static_cast<std::size_t>(window.last_row - window.first_row + 1), [&](std::size_t r) {
+        const auto begin = result.begin() + static_cast<std::ptrdiff_t>(
+                                                r + static_cast<std::size_t>(window.first_row)) *
+                                                grid.columns();
+        std::fill(begin + window.first_column, begin + window.last_column + 1, Sight::kUnknown);
+      });
   const SweepGround ground(grid, sight.frame(), target_height_m);
   constexpr std::size_t kWedges = 4;
   constexpr auto kParts = static_cast<std::size_t>(SweepPart::kPartsInWedge);
