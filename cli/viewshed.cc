@@ -197,11 +197,13 @@ class ViewshedRun {
       result["seen_samples"] = std::count_if(counts.begin(), counts.end(),
                                              [&](std::uint32_t n) { return n > 0 && !is_void(n); });
     } else {
-      std::array<std::size_t, 256> of{};
-      for (const Sight s : seen()) ++of[static_cast<std::size_t>(s)];
-      result["visible_samples"] = of[static_cast<std::size_t>(Sight::kVisible)];
-      result["hidden_samples"] = of[static_cast<std::size_t>(Sight::kHidden)];
-      result["unknown_samples"] = of[static_cast<std::size_t>(Sight::kUnknown)];
+      const std::span<const Sight> sight = seen();
+      const auto samples_with = [&](Sight value) {
+        return std::count(sight.begin(), sight.end(), value);
+      };
+      result["visible_samples"] = samples_with(Sight::kVisible);
+      result["hidden_samples"] = samples_with(Sight::kHidden);
+      result["unknown_samples"] = samples_with(Sight::kUnknown);
     }
     return result;
   }

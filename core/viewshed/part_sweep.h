@@ -21,6 +21,9 @@ struct SweepPart {
   std::int32_t number = 0;  ///< [0, kPartsInWedge), by rising tangent
 };
 
+/// What all parts of a sweep share; made by sweep_viewshed.
+struct SweepGround;
+
 /// How the samples of a sweep were decided.
 struct SweepCounts {
   std::uint64_t targets = 0;
@@ -39,9 +42,9 @@ struct SweepCounts {
 /// In the picture that the eye has, t = (sideways / forwards) and s = (rise / forwards), straight
 /// segments stay straight, so a grid line is a polyline. The part is cut into bins of t, about one
 /// a sample; a sweep from the eye outwards keeps for each bin a lower and an upper bound of the
-/// horizon's s that hold for all directions of the bin, and the range of grid lines that may lie
-/// between the two. A target under the lower or above the upper bound is decided; the others are
-/// compared exactly with the lines of that range.
+/// horizon's s that hold for all directions of the bin. A target under the lower or above the upper
+/// bound is decided; the others are compared exactly with the lines that reach their s in the bin
+/// (BinHistory).
 ///
 /// Side of error of the bounds: outwards, by margins derived in part_sweep.cc; what they leave
 /// open is decided by exact predicates, so the result has no error.
@@ -50,21 +53,22 @@ struct SweepCounts {
 /// Source: the interval method, docs/viewshed.md.
 class PartSweep {
  public:
-  /// @param sight            judge for the same grid and eye, kept by reference
+  /// @param sight, ground    for the same grid, eye and target height, kept by reference
   /// @param target_height_m  of targets above their samples
   /// @param window           samples outside are no targets, though they block
-  PartSweep(const GridSight& sight, double target_height_m, const SampleWindow& window);
+  PartSweep(const GridSight& sight, const SweepGround& ground, double target_height_m,
+            const SampleWindow& window);
 
   /// @param result[out]  [rows * columns]; the part's known samples in the window are written,
   /// others left
   SweepCounts run(const SweepPart& part, std::span<Sight> result);
 
  private:
-  struct Bins;
   struct Line;
   class Run;
 
   const GridSight& sight_;
+  const SweepGround& ground_;
   double target_height_m_;
   SampleWindow window_;
 };

@@ -1,0 +1,218 @@
+#include "core/viewshed/line_kernels.h"
+
+#include <algorithm>
+#include <cmath>
+
+// Sanitizers and other processors get the plain version.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
+    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define SCARP_FOR_EACH_TARGET \
+  __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
+#else
+#define SCARP_FOR_EACH_TARGET
+#endif
+
+namespace scarp {
+namespace {
+
+/// BlockPlacement::Along::at, written out so that loops over it become vectors.
+struct Quadratic {
+  double k0, k1, k2, k3, k4, k5, k6, k7, k8;
+
+  explicit Quadratic(const BlockPlacement::Biquadratic& k)
+      : k0(k[0]), k1(k[1]), k2(k[2]), k3(k[3]), k4(k[4]), k5(k[5]), k6(k[6]), k7(k[7]), k8(k[8]) {}
+
+  double at(double u, double v) const {
+    const double constant = k0 + v * (k1 + v * k2);
+    const double linear = k3 + v * (k4 + v * k5);
+    const double square = k6 + v * (k7 + v * k8);
+    return constant + u * (linear + u * square);
+  }
+};
+
+}  // namespace
+
+SCARP_FOR_EACH_TARGET
+bool load_heights(const std::int32_t* steps, std::size_t stride, std::size_t count,
+                  double* __restrict z_m, std::uint8_t* __restrict is_void) {
+  std::uint8_t any = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::int32_t step = steps[i * stride];
+    const std::uint8_t missing = step == GroundGrid::kVoid;
+    any |= missing;
+    is_void[i] = missing;
+    z_m[i] = missing ? 0 : step * kLatticeStepM;
+  }
+  return any != 0;
+}
+
+SCARP_FOR_EACH_TARGET
+void place_run(const BlockPlacement::Block& block, double u, double du, double v, double dv,
+               std::size_t count, const double* __restrict z_m, const PlanFrame& frame,
+               double* __restrict across, double* __restrict down) {
+  const Quadratic x(block[BlockPlacement::kX]), tilt_x(block[BlockPlacement::kTiltX]),
+      y(block[BlockPlacement::kY]), tilt_y(block[BlockPlacement::kTiltY]);
+  const PlanFrame f = frame;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double at = static_cast<double>(static_cast<std::int32_t>(i));
+    const double ui = u + at * du, vi = v + at * dv;
+    const double x_m = round_to_lattice(x.at(ui, vi) + tilt_x.at(ui, vi) * z_m[i]);
+    const double y_m = round_to_lattice(y.at(ui, vi) + tilt_y.at(ui, vi) * z_m[i]);
+    across[i] = (x_m - f.eye_x_m) * f.across_x + (y_m - f.eye_y_m) * f.across_y;
+    down[i] = (x_m - f.eye_x_m) * f.down_x + (y_m - f.eye_y_m) * f.down_y;
+  }
+}
+
+SCARP_FOR_EACH_TARGET
+void raise_run(const BlockPlacement::Block& block, double u, double du, double v, double dv,
+               std::size_t count, const double* __restrict z_m, double height_m,
+               double* __restrict raised_m) {
+  const Quadratic height(block[BlockPlacement::kHeight]), lift(block[BlockPlacement::kLift]),
+      fall(block[BlockPlacement::kFall]);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double at = static_cast<double>(static_cast<std::int32_t>(i));
+    const double ui = u + at * du, vi = v + at * dv;
+    const double base = height.at(ui, vi), rate = lift.at(ui, vi), bend = fall.at(ui, vi);
+    const double rise = z_m[i] - base;
+    const double h = rise / (rate - rise * bend) + height_m;
+    raised_m[i] = round_to_lattice(base + h * rate / (1 + h * bend));
+  }
+}
+
+SCARP_FOR_EACH_TARGET
+bool take_picture(std::size_t count, const double* __restrict forwards,
+                  const double* __restrict sideways, const double* __restrict z_m,
+                  const std::uint8_t* __restrict is_void, double eye_z_m, double low_tangent,
+                  double bins_per_tangent, double least_forwards, float* __restrict t,
+                  float* __restrict s) {
+  double nearest = 1e300;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double inverse = 1 / forwards[i];
+    nearest = forwards[i] < nearest ? forwards[i] : nearest;
+    t[i] = static_cast<float>((sideways[i] * inverse - low_tangent) * bins_per_tangent);
+    const auto slope = static_cast<float>((z_m[i] - eye_z_m) * inverse);
+    s[i] = is_void[i] ? kNoGround : slope;
+  }
+  return nearest >= least_forwards;
+}
+
+SCARP_FOR_EACH_TARGET
+void take_level_picture(std::size_t count, double forwards, const double* __restrict sideways,
+                        const double* __restrict z_m, const std::uint8_t* __restrict is_void,
+                        double eye_z_m, double low_tangent, double bins_per_tangent,
+                        float* __restrict t, float* __restrict s) {
+  const double inverse = 1 / forwards;
+  for (std::size_t i = 0; i < count; ++i) {
+    t[i] = static_cast<float>((sideways[i] * inverse - low_tangent) * bins_per_tangent);
+    const auto slope = static_cast<float>((z_m[i] - eye_z_m) * inverse);
+    s[i] = is_void[i] ? kNoGround : slope;
+  }
+}
+
+SCARP_FOR_EACH_TARGET
+float take_rises(std::size_t count, const float* __restrict t, const float* __restrict s,
+                 const std::uint8_t* __restrict is_void, float* __restrict steep) {
+  if (count == 0) return kAnyGround;
+  steep[count - 1] = 0;
+  float closest = kAnyGround;
+  const auto rise = [&](std::size_t i) {
+    const float difference = std::abs(s[i + 1] - s[i]);
+    return (is_void[i] | is_void[i + 1]) != 0 ? 0.0F : difference;
+  };
+  for (std::size_t i = 0; i + 1 < count; ++i) {
+    const float spacing = t[i + 1] - t[i];
+    closest = spacing < closest ? spacing : closest;
+  }
+  for (std::size_t i = 1; i + 2 < count; ++i)
+    steep[i] = std::max(rise(i - 1), std::max(rise(i), rise(i + 1)));
+  if (count > 1) {
+    steep[0] = count > 2 ? std::max(rise(0), rise(1)) : rise(0);
+    if (count > 2) steep[count - 2] = std::max(rise(count - 3), rise(count - 2));
+  }
+  return closest;
+}
+
+SCARP_FOR_EACH_TARGET
+void even_places(std::size_t count, float per_edge, float begin, float* __restrict place) {
+  for (std::size_t e = 0; e < count; ++e)
+    place[e] = static_cast<float>(static_cast<std::int32_t>(e)) * per_edge + begin;
+}
+
+SCARP_FOR_EACH_TARGET
+void shift_places(std::size_t count, const float* __restrict place, float by,
+                  float* __restrict shifted) {
+  for (std::size_t e = 0; e < count; ++e) shifted[e] = place[e] + by;
+}
+
+SCARP_FOR_EACH_TARGET
+void edge_bounds(std::size_t edges, const float* __restrict place, const float* __restrict s,
+                 const float* __restrict steep, float per_rise, float slope_margin,
+                 std::int32_t* __restrict before, float* __restrict this_s,
+                 float* __restrict next_s, float* __restrict low, float* __restrict high) {
+  for (std::size_t e = 0; e < edges; ++e) {
+    const auto j = static_cast<std::int32_t>(place[e]);
+    const float f = place[e] - static_cast<float>(j);
+    const float from = s[j], to = s[j + 1];
+    const float at = from + f * (to - from);
+    const float margin = per_rise * steep[j] + slope_margin * std::abs(at);
+    before[e] = j;
+    this_s[e] = from;
+    next_s[e] = to;
+    low[e] = at - margin;
+    high[e] = at + margin;
+  }
+}
+
+SCARP_FOR_EACH_TARGET
+bool bin_bounds(std::size_t bins, const float* __restrict place,
+                const float* __restrict place_before, float slack, const float* __restrict higher,
+                const std::int32_t* __restrict before, const float* __restrict this_s,
+                const float* __restrict next_s, const float* __restrict edge_low,
+                const float* __restrict edge_high, float* __restrict up, float* __restrict low,
+                float* __restrict high) {
+  std::int32_t most = 0;
+  for (std::size_t b = 0; b < bins; ++b) {
+    // Segments that touch the bin: from the first sample that is past its lower edge on either
+    // line to the last that is not past its upper edge.
+    const float begin = std::min(place[b], place_before[b]) - slack;
+    const float end = std::max(place[b + 1], place_before[b + 1]) + slack;
+    const std::int32_t first = static_cast<std::int32_t>(begin) + 1;
+    const auto last = static_cast<std::int32_t>(end);
+    const std::int32_t middle = first + 1 < last ? first + 1 : last;
+    most = last - first > most ? last - first : most;
+    const float ends = std::max(edge_high[b], edge_high[b + 1]);
+    const float between = std::max(std::max(higher[first], higher[last]), higher[middle]);
+    const float upper = last >= first ? std::max(ends, between) : ends;
+    // Where a sample lies in the bin, the line may dip to it.
+    const float edge = std::min(edge_low[b], edge_low[b + 1]);
+    const float dip = std::min(edge, std::min(next_s[b], this_s[b + 1]));
+    const float lower = before[b + 1] > before[b] ? dip : edge;
+    up[b] = upper;
+    low[b] = std::max(low[b], lower);
+    high[b] = std::max(high[b], upper);
+  }
+  return most <= 2;
+}
+
+SCARP_FOR_EACH_TARGET
+void take_maximum(std::size_t count, const float* __restrict values, float* __restrict into) {
+  for (std::size_t i = 0; i < count; ++i) into[i] = std::max(into[i], values[i]);
+}
+
+SCARP_FOR_EACH_TARGET
+void classify(std::size_t count, const float* __restrict t, const float* __restrict s,
+              std::int32_t bins, const float* __restrict low, const float* __restrict high,
+              float slope_margin, Decision* __restrict decision) {
+  auto* to = reinterpret_cast<std::uint8_t*>(decision);
+  for (std::size_t i = 0; i < count; ++i) {
+    // Beyond the part's ends by rounding only; what is farther is nobody's target here.
+    const float within = std::min(std::max(t[i], 0.0F), static_cast<float>(bins));
+    const std::int32_t floor = static_cast<std::int32_t>(within);
+    const std::int32_t bin = floor < bins ? floor : bins - 1;
+    const float margin = slope_margin * std::abs(s[i]);
+    const std::int32_t seen = s[i] >= high[bin] + margin ? 1 : 2;
+    to[i] = static_cast<std::uint8_t>(s[i] < low[bin] - margin ? 0 : seen);
+  }
+}
+
+}  // namespace scarp
