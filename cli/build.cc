@@ -102,13 +102,23 @@ class Build {
   }
 
   void groups(const Progress& progress) {
-    CrystalOptions crystals;
-    crystals.seed = options_.seed;
-    crystals.group_triangles = static_cast<std::uint32_t>(options_.group_triangles);
-    crystals.seeds = options_.seeds.value_or(0);
-    crystals.min_group_triangles = options_.min_group_triangles;
-    if (options_.max_groups > 0) crystals.max_groups = options_.max_groups;
-    groups_ = build_groups(mesh_.tin, horizon_, crystals, progress, &grouping_);
+    const auto group_triangles = static_cast<std::uint32_t>(options_.group_triangles);
+    if (options_.growth == Growth::kHiddenTogether) {
+      HiddenTogetherOptions together;
+      together.seed = options_.seed;
+      together.group_triangles = group_triangles;
+      together.min_group_triangles = options_.min_group_triangles;
+      together.compactness = kCompactnessForStewart;
+      groups_ = build_groups(mesh_.tin, horizon_, together, progress, &grouping_);
+    } else {
+      CrystalOptions crystals;
+      crystals.seed = options_.seed;
+      crystals.group_triangles = group_triangles;
+      crystals.seeds = options_.seeds.value_or(0);
+      crystals.min_group_triangles = options_.min_group_triangles;
+      if (options_.max_groups > 0) crystals.max_groups = options_.max_groups;
+      groups_ = build_groups(mesh_.tin, horizon_, crystals, progress, &grouping_);
+    }
     write_groups(writer_.path_for(tile_file_name(kTile, "groups")), groups_, Existing::kRefuse);
     tile_.files.push_back(writer_.record(tile_file_name(kTile, "groups"), "groups"));
   }
@@ -194,9 +204,12 @@ class Build {
     scene.parameters = {{"sectors", std::int64_t{options_.sectors}},
                         {"subsectors", std::int64_t{options_.subsectors}},
                         {"horizon", std::string("stewart")},
+                        {"growth", growth_name(options_.growth)},
                         {"group_triangles", std::int64_t{options_.group_triangles}},
                         {"min_group_triangles", std::int64_t{options_.min_group_triangles}},
                         {"seed", static_cast<std::int64_t>(options_.seed)}};
+    if (options_.seeds) scene.parameters["seeds"] = std::int64_t{*options_.seeds};
+    if (options_.max_groups > 0) scene.parameters["max_groups"] = std::int64_t{options_.max_groups};
     if (mesh_options_.max_error_m) scene.parameters["max_error_m"] = *mesh_options_.max_error_m;
     if (mesh_options_.vertex_budget)
       scene.parameters["vertices"] = std::int64_t{*mesh_options_.vertex_budget};
@@ -263,6 +276,12 @@ int run_build(const BuildOptions& options) {
     throw Error(
         ErrorCode::kUsage,
         fmt::format("--max-error {}: metres, zero or more, were expected", *options.max_error_m));
+  if (options.growth != Growth::kBreadthFirst && (options.seeds || options.max_groups > 0))
+    throw Error(
+        ErrorCode::kUsage,
+        fmt::format("{}: only --growth breadth-first sows seeds and has a limit; add it, or "
+                    "give --group-triangles",
+                    options.seeds ? "--seeds" : "--max-groups"));
   Build build(options);
   build.run();
   if (options.common.json)

@@ -73,9 +73,21 @@ void add_build(CLI::App& app, BuildOptions& o, std::function<int()>& run) {
       ->check(CLI::Range(2, 1'000'000));
   c->add_option("--min-group-triangles", o.min_group_triangles,
                 "Groups below this are merged or set free; 30 unless given");
-  c->add_option("--seeds", o.seeds, "Crystals sown in the first pass, over --group-triangles");
-  c->add_option("--max-groups", o.max_groups, "No more groups than this; 0: no limit");
-  c->add_option("--seed", o.seed, "Where the sowing begins; the same seed repeats a run exactly");
+  c->add_option_function<std::string>(
+       "--growth",
+       [&o](const std::string& text) {
+         o.growth = text == "breadth-first" ? Growth::kBreadthFirst : Growth::kHiddenTogether;
+       },
+       "hidden-together, from a sample of eyes, or breadth-first, as published; hidden-together "
+       "unless given")
+      ->check(CLI::IsMember({"hidden-together", "breadth-first"}));
+  c->add_option("--seeds", o.seeds,
+                "Breadth-first: crystals sown in the first pass, over --group-triangles");
+  c->add_option("--max-groups", o.max_groups,
+                "Breadth-first: no more groups than this; 0: no limit");
+  c->add_option(
+      "--seed", o.seed,
+      "Of the numbers that scatter eyes or crystals; the same seed repeats a run exactly");
   c->add_option_function<std::string>("--observer", position_into(o.observer),
                                       "Eye of layers/viewshed.tif, X,Y[,H]; 2 m above the highest "
                                       "sample unless given");

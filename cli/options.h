@@ -28,6 +28,9 @@ struct TypedPosition {
   std::string text;  ///< as typed, for messages
 };
 
+/// What guides the growth of groups.
+enum class Growth { kHiddenTogether, kBreadthFirst };
+
 struct BuildOptions {
   CommonOptions common;
   DemOptions dem;
@@ -39,10 +42,11 @@ struct BuildOptions {
   std::string footprints_height_field = "height";
   int sectors = 16;
   int subsectors = 4;
+  Growth growth = Growth::kHiddenTogether;
   int group_triangles = 128;
   std::uint32_t min_group_triangles = 30;
-  std::optional<std::uint32_t> seeds;
-  std::uint32_t max_groups = 0;
+  std::optional<std::uint32_t> seeds;  ///< breadth-first only
+  std::uint32_t max_groups = 0;        ///< breadth-first only; 0: no limit
   std::uint64_t seed = 1;
   std::optional<TypedPosition> observer;
   std::string crs;  ///< of the observer; empty: the data's

@@ -26,6 +26,10 @@ nlohmann::json library_versions() {
                        "." + std::to_string(PROJ_VERSION_PATCH)}};
 }
 
+std::string growth_name(Growth growth) {
+  return growth == Growth::kBreadthFirst ? "breadth-first" : "hidden-together";
+}
+
 nlohmann::json build_report(const BuildOptions& options, const Dem& dem, const Mesh& mesh,
                             const MeshOptions& mesh_options, const Groups& groups,
                             const GroupingReport& grouping, const MapPoint& observer,
@@ -46,6 +50,7 @@ nlohmann::json build_report(const BuildOptions& options, const Dem& dem, const M
       {"sectors", options.sectors},
       {"subsectors", options.subsectors},
       {"horizon", "stewart"},
+      {"growth", growth_name(options.growth)},
       {"group_triangles", options.group_triangles},
       {"min_group_triangles", options.min_group_triangles},
       {"seed", options.seed},

@@ -16,6 +16,9 @@ namespace scarp {
 /// The error that the mesh is asked for where the user names none: a tenth of the cell size.
 inline constexpr double kDefaultErrorCells = 0.1;
 
+/// As it is typed and recorded.
+std::string growth_name(Growth growth);
+
 /// What report.json tells of a build. Docs: docs/formats.md.
 nlohmann::json build_report(const BuildOptions& options, const Dem& dem, const Mesh& mesh,
                             const MeshOptions& mesh_options, const Groups& groups,

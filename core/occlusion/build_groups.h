@@ -1,6 +1,10 @@
 #pragma once
 
+#include "core/horizon/sectors.h"
 #include "core/occlusion/crystals.h"
+#include "core/occlusion/groups.h"
+#include "core/occlusion/hidden_together.h"
+#include "core/threads/progress.h"
 
 namespace scarp {
 
@@ -10,8 +14,18 @@ struct GroupingReport {
   std::uint32_t orphans = 0;  ///< triangles that are always drawn
 };
 
-/// Crystals and the tree above them, from a surface and its horizons.
+/// HiddenTogetherOptions::compactness for regions of method `stewart`: they are intersections over
+/// all of a group's vertices and lose more by distance than by what is seen.
+inline constexpr double kCompactnessForStewart = 4;
+
+/// Groups that are hidden together and the tree above them, from a surface and its horizons.
 /// @param report  may be null
+/// Requires, cost, source: see grow_hidden_together and build_group_tree.
+Groups build_groups(const Tin& tin, const HorizonTable& horizon,
+                    const HiddenTogetherOptions& options, const Progress& progress = {},
+                    GroupingReport* report = nullptr);
+
+/// The same with crystals grown breadth-first, as published.
 /// Requires, cost, source: see grow_crystals and build_group_tree.
 Groups build_groups(const Tin& tin, const HorizonTable& horizon, const CrystalOptions& options,
                     const Progress& progress = {}, GroupingReport* report = nullptr);

@@ -265,6 +265,9 @@ TEST_F(BuiltScene, RefusalsAreOneLineAndLeaveNothingBehind) {
       {"build " + dem + " -o " + f + "/x --max-error 1 --vertices 9", 2, "excludes"},
       {"build " + dem + " -o " + f + "/x --max-error -1", 2, "--max-error"},
       {"build " + dem + " -o " + f + "/x --sectors 3", 2, "--sectors"},
+      {"build " + dem + " -o " + f + "/x --growth fast", 2, "--growth"},
+      {"build " + dem + " -o " + f + "/x --seeds 100", 2, "--growth breadth-first"},
+      {"build " + dem + " -o " + f + "/x --max-groups 200", 2, "--growth breadth-first"},
       {"build", 2, "--help"},
       {"frobnicate", 2, "--help"},
       {"cull " + f + "/missing --camera 0,0", 1, "missing"},
@@ -292,6 +295,19 @@ TEST_F(BuiltScene, FullDiskIsOneLineAndLeavesNothingBehind) {
   EXPECT_EQ(run.exit_code, 1) << run.errors;
   EXPECT_EQ(std::count(run.errors.begin(), run.errors.end(), '\n'), 1) << run.errors;
   EXPECT_EQ(listing(folder_->folder()), before);
+}
+
+TEST_F(BuiltScene, GrowthIsRecordedAndGroupsLeaveNoOrphansUnlessPublished) {
+  EXPECT_EQ(read_json(scene_ + "/report.json")["groups"]["orphans"], 0);
+  EXPECT_EQ(read_json(scene_ + "/scene.json")["parameters"]["growth"], "hidden-together");
+  const std::string other = folder_->path("breadth.scene");
+  const RunResult run = run_scarp("$SCARP build " + dem_ + " -o " + other +
+                                  " --max-error 25 --growth breadth-first --seeds 40 --json");
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  EXPECT_GT(json::parse(run.output)["groups"]["orphans"], 0);
+  const json parameters = read_json(other + "/scene.json")["parameters"];
+  EXPECT_EQ(parameters["growth"], "breadth-first");
+  EXPECT_EQ(parameters["seeds"], 40);
 }
 
 TEST_F(BuiltScene, OverwriteReplacesTheScene) {
