@@ -227,7 +227,7 @@ class PartSweep::Run {
   void take_targets(const Line& line);
   Sight decide_seen(const Line& line, const Line* before, std::int32_t k, Decision decision);
   bool crosses_before(const Line& before, std::int32_t i, float t) const;
-  bool stands_free(const Position& at, const Position& ground) const;
+  bool stands_free(const Position& at, std::int32_t line, std::int32_t i) const;
 
   void add_whole(const Line& line, const Line* before);
   void add_in_pieces(const Line& line, const Line* before);
@@ -622,12 +622,18 @@ bool PartSweep::Run::crosses_before(const Line& before, std::int32_t i, float t)
 
 /// A raised target may stand beside its sample, by what the normal leans: does it stand so little
 /// beside that the segments at the sample, which it may be a step beyond, cannot block it?
-bool PartSweep::Run::stands_free(const Position& at, const Position& ground) const {
+bool PartSweep::Run::stands_free(const Position& at, std::int32_t line, std::int32_t i) const {
+  const Position ground = position(line, i);
   if (at.x_m == ground.x_m && at.y_m == ground.y_m) return true;
   const Picture p = picture(at), g = picture(ground);
   const double aside = std::abs(p.forwards - g.forwards) + std::abs(p.sideways - g.sideways);
   const double slope_m = std::abs(p.rise_m) / p.forwards;
-  return aside < 0.25 && at.z_m - ground.z_m > 4 * aside * (ground_.steepest_m + slope_m);
+  if (aside > 0.25 || at.z_m - ground.z_m < 4 * aside * (ground_.steepest_m + slope_m))
+    return false;
+  for (std::int32_t l = std::max(0, line - 1); l <= std::min(lines_ - 1, line + 1); ++l)
+    for (std::int32_t k = std::max(0, i - 1); k <= std::min(samples_ - 1, i + 1); ++k)
+      if (!is_known(l, k)) return false;
+  return true;
 }
 
 /// A target that is not hidden for certain.
@@ -638,8 +644,7 @@ Sight PartSweep::Run::decide_seen(const Line& line, const Line* before, std::int
   const bool raised = target_height_m_ != 0;
   const float t = raised ? target_t_[n] : line.t[n], s = raised ? target_s_[n] : line.s[n];
   if (before && crosses_before(*before, i, t)) return judge(line.number, i);
-  if (raised && !stands_free(target(line.number, i), position(line.number, i)))
-    return judge(line.number, i);
+  if (raised && !stands_free(target(line.number, i), line.number, i)) return judge(line.number, i);
   const auto bins = static_cast<float>(bins_);
   if (raised && (t < -slack() || t > bins + slack())) return judge(line.number, i);
   const auto bin = static_cast<std::int32_t>(std::clamp(t, 0.0F, bins - 1));
