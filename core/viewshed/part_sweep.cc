@@ -217,9 +217,9 @@ class PartSweep::Run {
   void halve_bins();
   void fill(Line& to, std::int32_t line);
   void take_samples(Line& to, std::int32_t first, std::int32_t last);
-  void take_separable(Line& to, std::size_t count);
-  void take_blocks(Line& to, std::size_t count);
-  void take_each(Line& to, std::size_t count);
+  template <typename Body>
+  void for_blocks(std::int32_t line, std::int32_t first, std::size_t count, const Body& body) const;
+  void take_pictures(const Line& line, const double* z_m, float* t, float* s);
   void find_edges(Line& to) const;
 
   void decide(const Line& line, const Line* before);
@@ -464,51 +464,58 @@ void PartSweep::Run::halve_bins() {
   for (float& t : before_->t) t *= 2;
 }
 
-void PartSweep::Run::take_separable(Line& to, std::size_t count) {
-  const auto& along = over_columns_ ? ground_.down_of_row : ground_.across_of_column;
-  const auto& outwards = over_columns_ ? ground_.across_of_column : ground_.down_of_row;
-  const double forwards = outwards_ * outwards[static_cast<std::size_t>(to.number)];
-  if (!(forwards > kNearCells / 2)) bounds_hold_ = false;
-  take_level_picture(count, forwards, &along[static_cast<std::size_t>(to.first)], to.z_m.data(),
-                     to.is_void.data(), sight_.eye().z_m, low_tangent_, bins_per_tangent(),
-                     to.t.data(), to.s.data());
-}
-
-void PartSweep::Run::take_blocks(Line& to, std::size_t count) {
+/// Calls body(block, index in the run, count, u, du, v, dv) for the pieces of a run of samples of a
+/// line, block by block.
+template <typename Body>
+void PartSweep::Run::for_blocks(std::int32_t line, std::int32_t first, std::size_t count,
+                                const Body& body) const {
   const auto& blocks = std::get<BlockPlacement>(grid_.placement());
-  across_.resize(count);
-  down_.resize(count);
   const double step = 2.0 / blocks.side;
   for (std::size_t k = 0; k < count;) {
-    const std::int32_t i = to.first + static_cast<std::int32_t>(k);
-    const std::int32_t column = over_columns_ ? to.number : i, row = over_columns_ ? i : to.number;
-    const std::size_t end =
-        std::min(count, k + static_cast<std::size_t>(blocks.side - i % blocks.side));
-    place_run(blocks.block_of(column, row), blocks.local(column), over_columns_ ? 0 : step,
-              blocks.local(row), over_columns_ ? step : 0, end - k, &to.z_m[k], frame_, &across_[k],
-              &down_[k]);
-    k = end;
+    const std::int32_t i = first + static_cast<std::int32_t>(k);
+    const std::int32_t column = over_columns_ ? line : i, row = over_columns_ ? i : line;
+    const std::size_t length =
+        std::min(count - k, static_cast<std::size_t>(blocks.side - i % blocks.side));
+    body(blocks.block_of(column, row), k, length, blocks.local(column), over_columns_ ? 0 : step,
+         blocks.local(row), over_columns_ ? step : 0);
+    k += length;
+  }
+}
+
+/// t and s of samples of a line, from first on, at heights z_m.
+void PartSweep::Run::take_pictures(const Line& line, const double* z_m, float* t, float* s) {
+  const std::size_t count = line.z_m.size();
+  const double eye_z_m = sight_.eye().z_m;
+  if (!ground_.across_of_column.empty()) {
+    const auto& along = over_columns_ ? ground_.down_of_row : ground_.across_of_column;
+    const auto& outwards = over_columns_ ? ground_.across_of_column : ground_.down_of_row;
+    const double forwards = outwards_ * outwards[static_cast<std::size_t>(line.number)];
+    if (!(forwards > kNearCells / 2)) bounds_hold_ = false;
+    take_level_picture(count, forwards, &along[static_cast<std::size_t>(line.first)], z_m,
+                       line.is_void.data(), eye_z_m, low_tangent_, bins_per_tangent(), t, s);
+    return;
+  }
+  across_.resize(count);
+  down_.resize(count);
+  if (std::holds_alternative<BlockPlacement>(grid_.placement())) {
+    for_blocks(line.number, line.first, count,
+               [&](const BlockPlacement::Block& block, std::size_t k, std::size_t length, double u,
+                   double du, double v, double dv) {
+                 place_run(block, u, du, v, dv, length, z_m + k, frame_, &across_[k], &down_[k]);
+               });
+  } else {
+    for (std::size_t k = 0; k < count; ++k) {
+      const Position p = position(line.number, line.first + static_cast<std::int32_t>(k));
+      across_[k] = frame_.across(p.x_m, p.y_m);
+      down_[k] = frame_.down(p.x_m, p.y_m);
+    }
   }
   std::vector<double>& forwards = over_columns_ ? across_ : down_;
   if (outwards_ < 0)
     for (double& f : forwards) f = -f;
-  if (!take_picture(count, forwards.data(), over_columns_ ? down_.data() : across_.data(),
-                    to.z_m.data(), to.is_void.data(), sight_.eye().z_m, low_tangent_,
-                    bins_per_tangent(), kNearCells / 2, to.t.data(), to.s.data()))
-    bounds_hold_ = false;
-}
-
-void PartSweep::Run::take_each(Line& to, std::size_t count) {
-  across_.resize(count);
-  down_.resize(count);
-  for (std::size_t k = 0; k < count; ++k) {
-    const Picture p = picture(position(to.number, to.first + static_cast<std::int32_t>(k)));
-    across_[k] = p.forwards;
-    down_[k] = p.sideways;
-  }
-  if (!take_picture(count, across_.data(), down_.data(), to.z_m.data(), to.is_void.data(),
-                    sight_.eye().z_m, low_tangent_, bins_per_tangent(), kNearCells / 2, to.t.data(),
-                    to.s.data()))
+  if (!take_picture(count, forwards.data(), over_columns_ ? down_.data() : across_.data(), z_m,
+                    line.is_void.data(), eye_z_m, low_tangent_, bins_per_tangent(), kNearCells / 2,
+                    t, s))
     bounds_hold_ = false;
 }
 
@@ -524,12 +531,7 @@ void PartSweep::Run::take_samples(Line& to, std::int32_t first, std::int32_t las
       over_columns_ ? grid_.row_steps(first) + to.number : grid_.row_steps(to.number) + first;
   to.has_void = load_heights(steps, over_columns_ ? grid_.stride() : 1, count, to.z_m.data(),
                              to.is_void.data());
-  if (!ground_.across_of_column.empty())
-    take_separable(to, count);
-  else if (std::holds_alternative<BlockPlacement>(grid_.placement()))
-    take_blocks(to, count);
-  else
-    take_each(to, count);
+  take_pictures(to, to.z_m.data(), to.t.data(), to.s.data());
 }
 
 /// The picture of a line, kBeyond samples more than the part to both sides where the grid has
@@ -593,20 +595,22 @@ void PartSweep::Run::find_edges(Line& to) const {
 
 /// t and s of the targets of a line.
 void PartSweep::Run::take_targets(const Line& line) {
-  const std::size_t n = line.t.size();
-  target_t_.resize(n);
-  target_s_.resize(n);
-  for (std::size_t k = 0; k < n; ++k) {
-    if (line.is_void[k]) {
-      target_t_[k] = line.t[k];
-      target_s_[k] = 0;
-      continue;
-    }
-    const Picture p = picture(target(line.number, line.first + static_cast<std::int32_t>(k)));
-    target_t_[k] =
-        static_cast<float>((p.sideways / p.forwards - low_tangent_) * bins_per_tangent());
-    target_s_[k] = static_cast<float>(p.rise_m / p.forwards);
+  const std::size_t count = line.t.size();
+  target_t_.resize(count);
+  target_s_.resize(count);
+  raised_m_.resize(count);
+  if (std::holds_alternative<BlockPlacement>(grid_.placement())) {
+    for_blocks(line.number, line.first, count,
+               [&](const BlockPlacement::Block& block, std::size_t k, std::size_t length, double u,
+                   double du, double v, double dv) {
+                 raise_run(block, u, du, v, dv, length, &line.z_m[k], target_height_m_,
+                           &raised_m_[k]);
+               });
+  } else {
+    for (std::size_t k = 0; k < count; ++k)
+      raised_m_[k] = round_to_lattice(line.z_m[k] + target_height_m_);
   }
+  take_pictures(line, raised_m_.data(), target_t_.data(), target_s_.data());
 }
 
 /// On its way from the line before, can a line of sight to sample i cross a segment that joins the
