@@ -79,7 +79,7 @@ void expect_equal(const std::string& file, const DemOptions& options) {
   const GroundGrid grid = read_ground({file}, options, {}).grid;
   const auto columns = static_cast<std::size_t>(grid.columns());
   const std::size_t cells = columns * static_cast<std::size_t>(grid.rows());
-  std::vector<Sight> judged(cells), swept(cells);
+  std::vector<Seen> judged(cells), swept(cells);
   for (const Eye& at : eyes_of(grid)) {
     for (const auto& [eye_m, target_m] : kHeights) {
       const bool between = target_m > 0 && at.column > 0 && at.row > 0;
