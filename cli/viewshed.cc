@@ -117,8 +117,8 @@ class ViewshedRun {
     }
   }
 
-  std::span<const Sight> seen() const {
-    return any_ ? any_->sight() : std::span<const Sight>(sight_);
+  std::span<const Seen> seen() const {
+    return any_ ? any_->sight() : std::span<const Seen>(sight_);
   }
 
   void write() {
@@ -135,7 +135,7 @@ class ViewshedRun {
   }
 
   void write_values(RasterLayer& layer) {
-    const std::span<const Sight> sight = seen();
+    const std::span<const Seen> sight = seen();
     const std::span<const std::uint8_t> bytes(reinterpret_cast<const std::uint8_t*>(sight.data()),
                                               sight.size());
     if (!options_.gdal_values) {
@@ -146,9 +146,8 @@ class ViewshedRun {
       return;
     }
     gdal_values_.resize(bytes.size());
-    std::transform(sight.begin(), sight.end(), gdal_values_.begin(), [](Sight s) {
-      return static_cast<std::uint8_t>(s == Sight::kVisible ? 255 : 0);
-    });
+    std::transform(sight.begin(), sight.end(), gdal_values_.begin(),
+                   [](Seen s) { return static_cast<std::uint8_t>(s == Seen::kVisible ? 255 : 0); });
     layer = layer_over(ground_.dem, std::span<const std::uint8_t>(gdal_values_), "visible");
     layer.metadata["VALUES"] = "255 visible, 0 hidden or unknown";
   }
@@ -197,13 +196,13 @@ class ViewshedRun {
       result["seen_samples"] = std::count_if(counts.begin(), counts.end(),
                                              [&](std::uint32_t n) { return n > 0 && !is_void(n); });
     } else {
-      const std::span<const Sight> sight = seen();
-      const auto samples_with = [&](Sight value) {
+      const std::span<const Seen> sight = seen();
+      const auto samples_with = [&](Seen value) {
         return std::count(sight.begin(), sight.end(), value);
       };
-      result["visible_samples"] = samples_with(Sight::kVisible);
-      result["hidden_samples"] = samples_with(Sight::kHidden);
-      result["unknown_samples"] = samples_with(Sight::kUnknown);
+      result["visible_samples"] = samples_with(Seen::kVisible);
+      result["hidden_samples"] = samples_with(Seen::kHidden);
+      result["unknown_samples"] = samples_with(Seen::kUnknown);
     }
     return result;
   }
@@ -239,7 +238,7 @@ class ViewshedRun {
   StageClock clock_;
   Ground ground_;
   std::vector<GroundEye> eyes_;
-  std::vector<Sight> sight_;
+  std::vector<Seen> sight_;
   std::optional<AnyEye> any_;
   std::optional<EyeCount> count_;
   std::vector<std::uint8_t> gdal_values_;

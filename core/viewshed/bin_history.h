@@ -18,9 +18,11 @@ class BinHistory {
   void end_line();
 
   /// Calls blocks(line) for the lines whose upper bound in a bin is at least s, latest first, until
-  /// one returns true. @param bins  in which the bin is counted
+  /// one returns true.
+  /// @param bins  in which the bin is counted
+  /// @param s     read anew for each line, so that blocks may raise it
   template <typename Blocks>
-  bool any_line(std::int32_t bin, std::int32_t bins, float s, const Blocks& blocks) const {
+  bool any_line(std::int32_t bin, std::int32_t bins, const float& s, const Blocks& blocks) const {
     for (std::size_t i = groups_.size(); i-- > 0;) {
       const Group& group = groups_[i];
       const auto b = static_cast<std::size_t>(bin) / static_cast<std::size_t>(bins / group.bins);

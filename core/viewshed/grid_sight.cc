@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "core/geodesy/predicates.h"
@@ -45,9 +46,9 @@ Meeting meet_inside(const Position& eye, const Position& target, const Position&
   return orient3d(eye, target, u, v) * u_side > 0 ? Meeting::kBlocked : Meeting::kNone;
 }
 
-Sight worse(Sight sight, Meeting meeting) {
-  if (meeting == Meeting::kBlocked) return Sight::kHidden;
-  if (meeting == Meeting::kVoid && sight == Sight::kVisible) return Sight::kUnknown;
+Seen worse(Seen sight, Meeting meeting) {
+  if (meeting == Meeting::kBlocked) return Seen::kHidden;
+  if (meeting == Meeting::kVoid && sight == Seen::kVisible) return Seen::kUnknown;
   return sight;
 }
 
@@ -95,21 +96,6 @@ struct GridSight::Walk {
     while (i >= 0 && upper_side * side(at(line, i)) < 0) --i;
     return i;
   }
-  Meeting meet_on_line(std::int32_t line, std::int32_t i) const {
-    if (i < 0) return Meeting::kNone;
-    const Position u = at(line, i);
-    const int u_side = side(u);
-    if (u_side == 0 || i + 1 == samples)
-      return meet_sample(sight.eye_, target, u, u_side, is_known(line, i));
-    const Position v = at(line, i + 1);
-    return meet_inside(sight.eye_, target, u, u_side, is_known(line, i), v, side(v),
-                       is_known(line, i + 1));
-  }
-  Meeting meet_between(std::int32_t line, std::int32_t next, std::int32_t i) const {
-    const Position u = at(line, i), v = at(next, i);
-    return meet_inside(sight.eye_, target, u, side(u), is_known(line, i), v, side(v),
-                       is_known(next, i));
-  }
 };
 
 GridSight::GridSight(const GroundGrid& grid, const Position& eye)
@@ -139,53 +125,130 @@ GridSight::Walk GridSight::start_walk(const Position& target, std::int32_t colum
   return walk;
 }
 
-Sight GridSight::walk_lines(const Walk& walk, std::int32_t first_line,
-                            std::int32_t last_line) const {
-  Sight sight = Sight::kVisible;
+/// Calls visit(u, u_known, v, v_known), until it returns false, for the segments between samples
+/// that the walk may cross near the lines; where the walk passes over a sample, one has it as u.
+template <typename Visit>
+void GridSight::visit_lines(const Walk& walk, std::int32_t first_line, std::int32_t last_line,
+                            const Visit& visit) const {
+  const auto at = [&](std::int32_t line, std::int32_t i, std::int32_t to_line, std::int32_t to_i) {
+    return visit(walk.at(line, i), walk.is_known(line, i), walk.at(to_line, to_i),
+                 walk.is_known(to_line, to_i));
+  };
   const std::int32_t step = first_line <= last_line ? 1 : -1;
   std::int32_t before = walk.last_before(first_line, walk.guess(first_line));
   for (std::int32_t line = first_line;; line += step) {
-    sight = worse(sight, walk.meet_on_line(line, before));
-    if (sight == Sight::kHidden || line == last_line) return sight;
+    // Beyond the last sample of a line the walk can only pass over that.
+    const std::int32_t to = before + 1 < walk.samples ? before + 1 : before - 1;
+    if (before >= 0 && !at(line, before, line, to)) return;
+    if (line == last_line) return;
     const std::int32_t next = line + step;
     const std::int32_t after = walk.last_before(
         next, before + static_cast<std::int32_t>(std::lround(step * walk.samples_per_line)));
-    for (std::int32_t i = std::min(before, after) + 1; i <= std::max(before, after); ++i) {
-      sight = worse(sight, walk.meet_between(line, next, i));
-      if (sight == Sight::kHidden) return sight;
-    }
+    for (std::int32_t i = std::min(before, after) + 1; i <= std::max(before, after); ++i)
+      if (!at(line, i, next, i)) return;
     before = after;
   }
 }
 
-Sight GridSight::judge(const Position& target, std::int32_t column, std::int32_t row) const {
-  if (same_plan(eye_, target)) return judge_vertical(target);
-  const Walk walk = start_walk(target, column, row, runs_across(target));
-  // Lines that the segment does not reach do no harm: each meeting is tested by itself. Two more
-  // to each side hold for an eye that is only estimated, and for a target off its line.
+Seen GridSight::walk_lines(const Walk& walk, std::int32_t first_line,
+                           std::int32_t last_line) const {
+  Seen sight = Seen::kVisible;
+  visit_lines(walk, first_line, last_line,
+              [&](const Position& u, bool u_known, const Position& v, bool v_known) {
+                const int u_side = walk.side(u);
+                sight = worse(sight, u_side == 0 ? meet_sample(eye_, walk.target, u, 0, u_known)
+                                                 : meet_inside(eye_, walk.target, u, u_side,
+                                                               u_known, v, walk.side(v), v_known));
+                return sight != Seen::kHidden;
+              });
+  return sight;
+}
+
+/// As walk_lines, but tells how high the walk's end must be for the ground not to block it.
+double GridSight::climb_lines_m(const Walk& walk, std::int32_t first_line, std::int32_t last_line,
+                                bool& over_void) const {
+  double least_m = -std::numeric_limits<double>::infinity();
+  const Position& target = walk.target;
+  const double run_x = target.x_m - eye_.x_m, run_y = target.y_m - eye_.y_m;
+  const double run2 = run_x * run_x + run_y * run_y;
+  visit_lines(walk, first_line, last_line,
+              [&](const Position& u, bool u_known, const Position& v, bool v_known) {
+                const int u_side = walk.side(u);
+                // Blocked or not, the segment meets the ground: a sunken target tells.
+                const Position sunken{target.x_m, target.y_m, -kLatticeReachM};
+                const Meeting meeting = u_side == 0 ? meet_sample(eye_, sunken, u, 0, u_known)
+                                                    : meet_inside(eye_, sunken, u, u_side, u_known,
+                                                                  v, walk.side(v), v_known);
+                if (meeting == Meeting::kVoid) over_void = true;
+                if (meeting != Meeting::kBlocked) return true;
+                double x = u.x_m - eye_.x_m, y = u.y_m - eye_.y_m, z = u.z_m - eye_.z_m;
+                if (u_side != 0) {
+                  const double from = run_x * y - run_y * x;
+                  const double to = run_x * (v.y_m - eye_.y_m) - run_y * (v.x_m - eye_.x_m);
+                  const double f = from / (from - to);
+                  x += f * (v.x_m - u.x_m);
+                  y += f * (v.y_m - u.y_m);
+                  z += f * (v.z_m - u.z_m);
+                }
+                const double reach = (x * run_x + y * run_y) / run2;
+                const double rise_m = z / reach;
+                constexpr double kRounding = 1e-12;
+                least_m = std::max(
+                    least_m, eye_.z_m + rise_m + kRounding * (std::abs(rise_m) + std::sqrt(run2)));
+                return true;
+              });
+  return least_m;
+}
+
+/// The lines between the eye and the walk's end, from there on. Lines that the segment does not
+/// reach do no harm: each meeting is tested by itself. Two more to each side hold for an eye that
+/// is only estimated, and for a target off its line.
+std::pair<std::int32_t, std::int32_t> GridSight::all_lines(const Walk& walk) const {
   constexpr double kMore = 2;
   const auto line = [&](double at) {
     return static_cast<std::int32_t>(std::clamp(at, 0.0, walk.lines - 1.0));
   };
   const std::int32_t low = line(std::floor(std::min(walk.eye_line, walk.target_line)) - kMore);
   const std::int32_t high = line(std::ceil(std::max(walk.eye_line, walk.target_line)) + kMore);
-  // From the target to the eye.
-  return walk.target_line > walk.eye_line ? walk_lines(walk, high, low)
-                                          : walk_lines(walk, low, high);
+  return walk.target_line > walk.eye_line ? std::pair(high, low) : std::pair(low, high);
+}
+
+double GridSight::least_z_m(const Position& sample, std::int32_t column, std::int32_t row,
+                            bool& over_void) const {
+  if (same_plan(eye_, sample)) return eye_.z_m < sample.z_m ? kLatticeReachM : sample.z_m;
+  const Walk walk = start_walk(sample, column, row, runs_across(sample));
+  const auto [first, last] = all_lines(walk);
+  return climb_lines_m(walk, first, last, over_void);
+}
+
+double GridSight::least_z_between_m(const Position& sample, std::int32_t column, std::int32_t row,
+                                    bool over_columns, std::int32_t first_line,
+                                    std::int32_t last_line) const {
+  const Walk walk = start_walk(sample, column, row, over_columns);
+  bool over_void = false;
+  return climb_lines_m(walk, std::clamp(first_line, 0, walk.lines - 1),
+                       std::clamp(last_line, 0, walk.lines - 1), over_void);
+}
+
+Seen GridSight::judge(const Position& target, std::int32_t column, std::int32_t row) const {
+  if (same_plan(eye_, target)) return judge_vertical(target);
+  const Walk walk = start_walk(target, column, row, runs_across(target));
+  const auto [first, last] = all_lines(walk);
+  return walk_lines(walk, first, last);
 }
 
 bool GridSight::is_blocked_between(const Position& target, std::int32_t column, std::int32_t row,
                                    bool over_columns, std::int32_t first_line,
                                    std::int32_t last_line) const {
-  if (same_plan(eye_, target)) return judge_vertical(target) == Sight::kHidden;
+  if (same_plan(eye_, target)) return judge_vertical(target) == Seen::kHidden;
   const Walk walk = start_walk(target, column, row, over_columns);
   return walk_lines(walk, std::clamp(first_line, 0, walk.lines - 1),
-                    std::clamp(last_line, 0, walk.lines - 1)) == Sight::kHidden;
+                    std::clamp(last_line, 0, walk.lines - 1)) == Seen::kHidden;
 }
 
-Sight GridSight::judge_vertical(const Position& target) const {
+Seen GridSight::judge_vertical(const Position& target) const {
   const Position& low = eye_.z_m < target.z_m ? eye_ : target;
-  Sight sight = Sight::kVisible;
+  Seen sight = Seen::kVisible;
   constexpr double kMore = 2;
   const auto within = [](double at, std::int32_t count) {
     return static_cast<std::int32_t>(std::clamp(at, 0.0, count - 1.0));
@@ -207,8 +270,8 @@ Sight GridSight::judge_vertical(const Position& target) const {
   return sight;
 }
 
-Sight sight_by_every_segment(const GroundGrid& grid, const Position& eye, const Position& target) {
-  Sight sight = Sight::kVisible;
+Seen sight_by_every_segment(const GroundGrid& grid, const Position& eye, const Position& target) {
+  Seen sight = Seen::kVisible;
   const bool vertical = same_plan(eye, target);
   const Position& low = eye.z_m < target.z_m ? eye : target;
   const auto meet = [&](std::int32_t c, std::int32_t r, std::int32_t to_c, std::int32_t to_r) {
@@ -234,7 +297,7 @@ Sight sight_by_every_segment(const GroundGrid& grid, const Position& eye, const 
 }
 
 void exhaustive_viewshed(const GroundGrid& grid, const Position& eye, double target_height_m,
-                         std::span<Sight> sight) {
+                         std::span<Seen> sight) {
   const auto columns = static_cast<std::size_t>(grid.columns());
   assert(sight.size() == columns * static_cast<std::size_t>(grid.rows()));
   const GridSight judge(grid, eye);
@@ -245,7 +308,7 @@ void exhaustive_viewshed(const GroundGrid& grid, const Position& eye, double tar
       sight[r * columns + c] =
           grid.is_known(column, row)
               ? judge.judge(grid.raised(column, row, target_height_m), column, row)
-              : Sight::kUnknown;
+              : Seen::kUnknown;
     }
   });
 }

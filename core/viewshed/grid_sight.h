@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <span>
+#include <utility>
 
 #include "core/geodesy/position.h"
 #include "core/terrain/ground_grid.h"
@@ -10,7 +11,7 @@
 namespace scarp {
 
 /// What an eye has of a target. The values are those of the output rasters.
-enum class Sight : std::uint8_t { kHidden = 0, kVisible = 1, kUnknown = 255 };
+enum class Seen : std::uint8_t { kHidden = 0, kVisible = 1, kUnknown = 255 };
 
 /// The judge of sight lines on the surface `grid` (model R3), exact.
 ///
@@ -34,7 +35,7 @@ class GridSight {
 
   /// Is a target seen that stands at or above a sample?
   /// @param target  GroundGrid::raised(column, row, height)
-  Sight judge(const Position& target, std::int32_t column, std::int32_t row) const;
+  Seen judge(const Position& target, std::int32_t column, std::int32_t row) const;
 
   /// Does known ground block the target near some of the grid lines that its segment crosses?
   /// Looked at are the lines [first_line, last_line] (either order) and the segments that join
@@ -43,6 +44,17 @@ class GridSight {
   ///                      or more; otherwise rows
   bool is_blocked_between(const Position& target, std::int32_t column, std::int32_t row,
                           bool over_columns, std::int32_t first_line, std::int32_t last_line) const;
+
+  /// The flattened height that a target over a sample must have at least to be seen, were it to
+  /// stand exactly over the sample; minus infinity where nothing is in between.
+  /// @param over_void[out]  is the segment over void ground, so that nothing is known for certain?
+  /// Accuracy: rounded up, by less than 0.1 mm for segments up to 1000 km.
+  double least_z_m(const Position& sample, std::int32_t column, std::int32_t row,
+                   bool& over_void) const;
+  /// The same over the lines of is_blocked_between, without void.
+  double least_z_between_m(const Position& sample, std::int32_t column, std::int32_t row,
+                           bool over_columns, std::int32_t first_line,
+                           std::int32_t last_line) const;
 
   const PlanFrame& frame() const { return frame_; }
   const Position& eye() const { return eye_; }
@@ -53,8 +65,14 @@ class GridSight {
   Walk start_walk(const Position& target, std::int32_t column, std::int32_t row,
                   bool over_columns) const;
   bool runs_across(const Position& target) const;
-  Sight walk_lines(const Walk& walk, std::int32_t first_line, std::int32_t last_line) const;
-  Sight judge_vertical(const Position& target) const;
+  template <typename Visit>
+  void visit_lines(const Walk& walk, std::int32_t first_line, std::int32_t last_line,
+                   const Visit& visit) const;
+  Seen walk_lines(const Walk& walk, std::int32_t first_line, std::int32_t last_line) const;
+  double climb_lines_m(const Walk& walk, std::int32_t first_line, std::int32_t last_line,
+                       bool& over_void) const;
+  std::pair<std::int32_t, std::int32_t> all_lines(const Walk& walk) const;
+  Seen judge_vertical(const Position& target) const;
 
   const GroundGrid& grid_;
   Position eye_;
@@ -63,12 +81,12 @@ class GridSight {
 
 /// The definition word by word: every segment and every sample of the grid is tested. For tests
 /// of the judge. Cost: O(columns * rows). Requires nothing of the grid lines.
-Sight sight_by_every_segment(const GroundGrid& grid, const Position& eye, const Position& target);
+Seen sight_by_every_segment(const GroundGrid& grid, const Position& eye, const Position& target);
 
 /// Judges every sample, raised by the target height.
 /// @param sight[out]  [rows * columns], kUnknown where the sample is void
 /// Cost: O(columns + rows) predicates a sample, on all threads; the same bits for any number.
 void exhaustive_viewshed(const GroundGrid& grid, const Position& eye, double target_height_m,
-                         std::span<Sight> sight);
+                         std::span<Seen> sight);
 
 }  // namespace scarp

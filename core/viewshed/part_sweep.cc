@@ -113,11 +113,11 @@ class ColumnTile {
   static constexpr std::size_t kStride = 64;
 
   explicit ColumnTile(std::int32_t rows)
-      : sight_(static_cast<std::size_t>(rows) * kStride, Sight::kUnknown),
+      : sight_(static_cast<std::size_t>(rows) * kStride, Seen::kUnknown),
         marks_(static_cast<std::size_t>(rows), 0) {}
 
   /// Where a column's results go, kStride apart.
-  Sight* column(std::int32_t column) { return &sight_[static_cast<std::size_t>(column) % kStride]; }
+  Seen* column(std::int32_t column) { return &sight_[static_cast<std::size_t>(column) % kStride]; }
 
   /// Rows [first, last] of a column are of the part.
   void mark(std::int32_t column, std::int32_t first, std::int32_t last) {
@@ -134,12 +134,12 @@ class ColumnTile {
   }
 
   /// Writes what is marked of the tile that a column belongs to, and begins anew.
-  void flush(std::int32_t column, std::int32_t columns, std::span<Sight> result) {
+  void flush(std::int32_t column, std::int32_t columns, std::span<Seen> result) {
     const std::size_t begin = static_cast<std::size_t>(column) / kStride * kStride;
     for (std::int32_t row = first_row_; row <= last_row_; ++row) {
       const auto r = static_cast<std::size_t>(row);
-      const Sight* from = &sight_[r * kStride];
-      Sight* to = &result[r * static_cast<std::size_t>(columns) + begin];
+      const Seen* from = &sight_[r * kStride];
+      Seen* to = &result[r * static_cast<std::size_t>(columns) + begin];
       // Mostly one run of columns; where rows bend there may be more.
       for (std::uint64_t marks = marks_[r]; marks != 0;) {
         const int first = std::countr_zero(marks);
@@ -154,14 +154,16 @@ class ColumnTile {
   }
 
  private:
-  std::vector<Sight> sight_;
+  std::vector<Seen> sight_;
   std::vector<std::uint64_t> marks_;
   std::int32_t first_row_ = std::numeric_limits<std::int32_t>::max(), last_row_ = -1;
 };
 
 class PartSweep::Run {
  public:
-  Run(const PartSweep& sweep, const SweepPart& part, std::span<Sight> result);
+  /// Either result or least_m is empty.
+  Run(const PartSweep& sweep, const SweepPart& part, std::span<Seen> result,
+      std::span<float> least_m);
   SweepCounts run();
 
  private:
@@ -182,7 +184,7 @@ class PartSweep::Run {
     return over_columns_ ? grid_.raised(line, i, target_height_m_)
                          : grid_.raised(i, line, target_height_m_);
   }
-  Sight judge(std::int32_t line, std::int32_t i) {
+  Seen judge(std::int32_t line, std::int32_t i) {
     ++counts_.traced_whole;
     return over_columns_ ? sight_.judge(target(line, i), line, i)
                          : sight_.judge(target(line, i), i, line);
@@ -217,17 +219,21 @@ class PartSweep::Run {
   void halve_bins();
   void fill(Line& to, std::int32_t line);
   void take_samples(Line& to, std::int32_t first, std::int32_t last);
-  void take_separable(Line& to, std::size_t count);
-  void take_blocks(Line& to, std::size_t count);
-  void take_each(Line& to, std::size_t count);
+  template <typename Body>
+  void for_blocks(std::int32_t line, std::int32_t first, std::size_t count, const Body& body) const;
+  void take_pictures(const Line& line, const double* z_m, float* t, float* s);
   void find_edges(Line& to) const;
 
   void decide(const Line& line, const Line* before);
+  void climb(const Line& line, const Line* before);
+  float climb_all(std::int32_t line, std::int32_t i);
+  float climb_in_bin(std::int32_t line, std::int32_t i, std::size_t bin);
+  float height_up_to(double z_m, std::int32_t line, std::int32_t i) const;
   std::pair<std::int32_t, std::int32_t> own_range(const Line& line) const;
   void take_targets(const Line& line);
-  Sight decide_seen(const Line& line, const Line* before, std::int32_t k, Decision decision);
+  Seen decide_seen(const Line& line, const Line* before, std::int32_t k, Decision decision);
   bool crosses_before(const Line& before, std::int32_t i, float t) const;
-  bool stands_free(const Position& at, const Position& ground) const;
+  bool stands_free(const Position& at, std::int32_t line, std::int32_t i) const;
 
   void add_whole(const Line& line, const Line* before);
   void add_in_pieces(const Line& line, const Line* before);
@@ -241,7 +247,8 @@ class PartSweep::Run {
   const SweepGround& ground_;
   double target_height_m_;
   SampleWindow window_;
-  std::span<Sight> result_;
+  std::span<Seen> result_;
+  std::span<float> least_m_;
   SweepPart part_;
 
   bool over_columns_ = true;
@@ -273,7 +280,8 @@ class PartSweep::Run {
   SweepCounts counts_;
 };
 
-PartSweep::Run::Run(const PartSweep& sweep, const SweepPart& part, std::span<Sight> result)
+PartSweep::Run::Run(const PartSweep& sweep, const SweepPart& part, std::span<Seen> result,
+                    std::span<float> least_m)
     : sight_(sweep.sight_),
       grid_(sight_.grid()),
       frame_(sight_.frame()),
@@ -281,6 +289,7 @@ PartSweep::Run::Run(const PartSweep& sweep, const SweepPart& part, std::span<Sig
       target_height_m_(sweep.target_height_m_),
       window_(sweep.window_),
       result_(result),
+      least_m_(least_m),
       part_(part),
       uneven_samples_(ground_.uneven_samples),
       low_(kFirstBins, kNoGround),
@@ -318,7 +327,7 @@ SweepCounts PartSweep::Run::run() {
     begin = outwards_ > 0 ? std::max<std::int64_t>(begin, 0)
                           : std::min<std::int64_t>(begin, lines_ - 1);
   if (!inside(begin)) return counts_;
-  if (over_columns_) tile_.emplace(samples_);
+  if (over_columns_ && least_m_.empty()) tile_.emplace(samples_);
   for (std::int64_t at = begin; (border - at) * outwards_ > 0; at += outwards_) {
     const auto line = static_cast<std::int32_t>(at);
     sweep_line(line, at == begin);
@@ -384,7 +393,10 @@ void PartSweep::Run::sweep_near(std::int32_t line, bool judge_targets) {
       add_near_segment(p, is_known(line, i), position(line, i + 1), is_known(line, i + 1), true);
     if (is_target(line, i) && is_known(line, i) && owns(picture(p))) {
       ++counts_.targets;
-      result_[result_index(line, i)] = judge(line, i);
+      if (least_m_.empty())
+        result_[result_index(line, i)] = judge(line, i);
+      else
+        least_m_[result_index(line, i)] = climb_all(line, i);
     }
   }
   std::copy(edge_high_.begin(), edge_high_.end(), up);
@@ -464,51 +476,58 @@ void PartSweep::Run::halve_bins() {
   for (float& t : before_->t) t *= 2;
 }
 
-void PartSweep::Run::take_separable(Line& to, std::size_t count) {
-  const auto& along = over_columns_ ? ground_.down_of_row : ground_.across_of_column;
-  const auto& outwards = over_columns_ ? ground_.across_of_column : ground_.down_of_row;
-  const double forwards = outwards_ * outwards[static_cast<std::size_t>(to.number)];
-  if (!(forwards > kNearCells / 2)) bounds_hold_ = false;
-  take_level_picture(count, forwards, &along[static_cast<std::size_t>(to.first)], to.z_m.data(),
-                     to.is_void.data(), sight_.eye().z_m, low_tangent_, bins_per_tangent(),
-                     to.t.data(), to.s.data());
-}
-
-void PartSweep::Run::take_blocks(Line& to, std::size_t count) {
+/// Calls body(block, index in the run, count, u, du, v, dv) for the pieces of a run of samples of a
+/// line, block by block.
+template <typename Body>
+void PartSweep::Run::for_blocks(std::int32_t line, std::int32_t first, std::size_t count,
+                                const Body& body) const {
   const auto& blocks = std::get<BlockPlacement>(grid_.placement());
-  across_.resize(count);
-  down_.resize(count);
   const double step = 2.0 / blocks.side;
   for (std::size_t k = 0; k < count;) {
-    const std::int32_t i = to.first + static_cast<std::int32_t>(k);
-    const std::int32_t column = over_columns_ ? to.number : i, row = over_columns_ ? i : to.number;
-    const std::size_t end =
-        std::min(count, k + static_cast<std::size_t>(blocks.side - i % blocks.side));
-    place_run(blocks.block_of(column, row), blocks.local(column), over_columns_ ? 0 : step,
-              blocks.local(row), over_columns_ ? step : 0, end - k, &to.z_m[k], frame_, &across_[k],
-              &down_[k]);
-    k = end;
+    const std::int32_t i = first + static_cast<std::int32_t>(k);
+    const std::int32_t column = over_columns_ ? line : i, row = over_columns_ ? i : line;
+    const std::size_t length =
+        std::min(count - k, static_cast<std::size_t>(blocks.side - i % blocks.side));
+    body(blocks.block_of(column, row), k, length, blocks.local(column), over_columns_ ? 0 : step,
+         blocks.local(row), over_columns_ ? step : 0);
+    k += length;
+  }
+}
+
+/// t and s of samples of a line, from first on, at heights z_m.
+void PartSweep::Run::take_pictures(const Line& line, const double* z_m, float* t, float* s) {
+  const std::size_t count = line.z_m.size();
+  const double eye_z_m = sight_.eye().z_m;
+  if (!ground_.across_of_column.empty()) {
+    const auto& along = over_columns_ ? ground_.down_of_row : ground_.across_of_column;
+    const auto& outwards = over_columns_ ? ground_.across_of_column : ground_.down_of_row;
+    const double forwards = outwards_ * outwards[static_cast<std::size_t>(line.number)];
+    if (!(forwards > kNearCells / 2)) bounds_hold_ = false;
+    take_level_picture(count, forwards, &along[static_cast<std::size_t>(line.first)], z_m,
+                       line.is_void.data(), eye_z_m, low_tangent_, bins_per_tangent(), t, s);
+    return;
+  }
+  across_.resize(count);
+  down_.resize(count);
+  if (std::holds_alternative<BlockPlacement>(grid_.placement())) {
+    for_blocks(line.number, line.first, count,
+               [&](const BlockPlacement::Block& block, std::size_t k, std::size_t length, double u,
+                   double du, double v, double dv) {
+                 place_run(block, u, du, v, dv, length, z_m + k, frame_, &across_[k], &down_[k]);
+               });
+  } else {
+    for (std::size_t k = 0; k < count; ++k) {
+      const Position p = position(line.number, line.first + static_cast<std::int32_t>(k));
+      across_[k] = frame_.across(p.x_m, p.y_m);
+      down_[k] = frame_.down(p.x_m, p.y_m);
+    }
   }
   std::vector<double>& forwards = over_columns_ ? across_ : down_;
   if (outwards_ < 0)
     for (double& f : forwards) f = -f;
-  if (!take_picture(count, forwards.data(), over_columns_ ? down_.data() : across_.data(),
-                    to.z_m.data(), to.is_void.data(), sight_.eye().z_m, low_tangent_,
-                    bins_per_tangent(), kNearCells / 2, to.t.data(), to.s.data()))
-    bounds_hold_ = false;
-}
-
-void PartSweep::Run::take_each(Line& to, std::size_t count) {
-  across_.resize(count);
-  down_.resize(count);
-  for (std::size_t k = 0; k < count; ++k) {
-    const Picture p = picture(position(to.number, to.first + static_cast<std::int32_t>(k)));
-    across_[k] = p.forwards;
-    down_[k] = p.sideways;
-  }
-  if (!take_picture(count, across_.data(), down_.data(), to.z_m.data(), to.is_void.data(),
-                    sight_.eye().z_m, low_tangent_, bins_per_tangent(), kNearCells / 2, to.t.data(),
-                    to.s.data()))
+  if (!take_picture(count, forwards.data(), over_columns_ ? down_.data() : across_.data(), z_m,
+                    line.is_void.data(), eye_z_m, low_tangent_, bins_per_tangent(), kNearCells / 2,
+                    t, s))
     bounds_hold_ = false;
 }
 
@@ -524,12 +543,7 @@ void PartSweep::Run::take_samples(Line& to, std::int32_t first, std::int32_t las
       over_columns_ ? grid_.row_steps(first) + to.number : grid_.row_steps(to.number) + first;
   to.has_void = load_heights(steps, over_columns_ ? grid_.stride() : 1, count, to.z_m.data(),
                              to.is_void.data());
-  if (!ground_.across_of_column.empty())
-    take_separable(to, count);
-  else if (std::holds_alternative<BlockPlacement>(grid_.placement()))
-    take_blocks(to, count);
-  else
-    take_each(to, count);
+  take_pictures(to, to.z_m.data(), to.t.data(), to.s.data());
 }
 
 /// The picture of a line, kBeyond samples more than the part to both sides where the grid has
@@ -593,20 +607,22 @@ void PartSweep::Run::find_edges(Line& to) const {
 
 /// t and s of the targets of a line.
 void PartSweep::Run::take_targets(const Line& line) {
-  const std::size_t n = line.t.size();
-  target_t_.resize(n);
-  target_s_.resize(n);
-  for (std::size_t k = 0; k < n; ++k) {
-    if (line.is_void[k]) {
-      target_t_[k] = line.t[k];
-      target_s_[k] = 0;
-      continue;
-    }
-    const Picture p = picture(target(line.number, line.first + static_cast<std::int32_t>(k)));
-    target_t_[k] =
-        static_cast<float>((p.sideways / p.forwards - low_tangent_) * bins_per_tangent());
-    target_s_[k] = static_cast<float>(p.rise_m / p.forwards);
+  const std::size_t count = line.t.size();
+  target_t_.resize(count);
+  target_s_.resize(count);
+  raised_m_.resize(count);
+  if (std::holds_alternative<BlockPlacement>(grid_.placement())) {
+    for_blocks(line.number, line.first, count,
+               [&](const BlockPlacement::Block& block, std::size_t k, std::size_t length, double u,
+                   double du, double v, double dv) {
+                 raise_run(block, u, du, v, dv, length, &line.z_m[k], target_height_m_,
+                           &raised_m_[k]);
+               });
+  } else {
+    for (std::size_t k = 0; k < count; ++k)
+      raised_m_[k] = round_to_lattice(line.z_m[k] + target_height_m_);
   }
+  take_pictures(line, raised_m_.data(), target_t_.data(), target_s_.data());
 }
 
 /// On its way from the line before, can a line of sight to sample i cross a segment that joins the
@@ -622,24 +638,29 @@ bool PartSweep::Run::crosses_before(const Line& before, std::int32_t i, float t)
 
 /// A raised target may stand beside its sample, by what the normal leans: does it stand so little
 /// beside that the segments at the sample, which it may be a step beyond, cannot block it?
-bool PartSweep::Run::stands_free(const Position& at, const Position& ground) const {
+bool PartSweep::Run::stands_free(const Position& at, std::int32_t line, std::int32_t i) const {
+  const Position ground = position(line, i);
   if (at.x_m == ground.x_m && at.y_m == ground.y_m) return true;
   const Picture p = picture(at), g = picture(ground);
   const double aside = std::abs(p.forwards - g.forwards) + std::abs(p.sideways - g.sideways);
   const double slope_m = std::abs(p.rise_m) / p.forwards;
-  return aside < 0.25 && at.z_m - ground.z_m > 4 * aside * (ground_.steepest_m + slope_m);
+  if (aside > 0.25 || at.z_m - ground.z_m < 4 * aside * (ground_.steepest_m + slope_m))
+    return false;
+  for (std::int32_t l = std::max(0, line - 1); l <= std::min(lines_ - 1, line + 1); ++l)
+    for (std::int32_t k = std::max(0, i - 1); k <= std::min(samples_ - 1, i + 1); ++k)
+      if (!is_known(l, k)) return false;
+  return true;
 }
 
 /// A target that is not hidden for certain.
-Sight PartSweep::Run::decide_seen(const Line& line, const Line* before, std::int32_t k,
-                                  Decision decision) {
+Seen PartSweep::Run::decide_seen(const Line& line, const Line* before, std::int32_t k,
+                                 Decision decision) {
   const auto n = static_cast<std::size_t>(k);
   const std::int32_t i = line.first + k;
   const bool raised = target_height_m_ != 0;
   const float t = raised ? target_t_[n] : line.t[n], s = raised ? target_s_[n] : line.s[n];
   if (before && crosses_before(*before, i, t)) return judge(line.number, i);
-  if (raised && !stands_free(target(line.number, i), position(line.number, i)))
-    return judge(line.number, i);
+  if (raised && !stands_free(target(line.number, i), line.number, i)) return judge(line.number, i);
   const auto bins = static_cast<float>(bins_);
   if (raised && (t < -slack() || t > bins + slack())) return judge(line.number, i);
   const auto bin = static_cast<std::int32_t>(std::clamp(t, 0.0F, bins - 1));
@@ -653,11 +674,11 @@ Sight PartSweep::Run::decide_seen(const Line& line, const Line* before, std::int
                                        over_columns_ ? i : line.number, over_columns_, across,
                                        across - outwards_);
     });
-    if (blocked) return Sight::kHidden;
+    if (blocked) return Seen::kHidden;
   }
   const auto b = static_cast<std::size_t>(bin);
-  if (all_void_[b]) return Sight::kUnknown;
-  return some_void_[b] ? judge(line.number, i) : Sight::kVisible;
+  if (all_void_[b]) return Seen::kUnknown;
+  return some_void_[b] ? judge(line.number, i) : Seen::kVisible;
 }
 
 /// The part's own samples of a line, as indices [first, end). Only near the part's ends does it
@@ -697,10 +718,10 @@ void PartSweep::Run::decide(const Line& line, const Line* before) {
     }
   }
   // Hidden and visible have the same values in both.
-  const auto* sight = reinterpret_cast<const Sight*>(decisions_.data());
-  Sight* to = tile_ ? tile_->column(line.number) +
-                          ColumnTile::kStride * static_cast<std::size_t>(line.first)
-                    : &result_[result_index(line.number, 0)] + line.first;
+  const auto* sight = reinterpret_cast<const Seen*>(decisions_.data());
+  Seen* to = tile_ ? tile_->column(line.number) +
+                         ColumnTile::kStride * static_cast<std::size_t>(line.first)
+                   : &result_[result_index(line.number, 0)] + line.first;
   const std::size_t stride = tile_ ? ColumnTile::kStride : 1;
   if (tile_) {
     tile_->mark(line.number, line.first + first, line.first + end - 1);
@@ -720,10 +741,73 @@ void PartSweep::Run::decide(const Line& line, const Line* before) {
     }
     const auto i = static_cast<std::int32_t>(k);
     if (line.is_void[k])
-      to[k * stride] = Sight::kUnknown;
+      to[k * stride] = Seen::kUnknown;
     else if (decisions_[k] != Decision::kHidden)
       to[k * stride] = bounds_hold_ ? decide_seen(line, before, i, decisions_[k])
                                     : judge(line.number, line.first + i);
+  }
+}
+
+/// Height above a sample, along its normal, of a flattened height, rounded up; 0 below ground.
+float PartSweep::Run::height_up_to(double z_m, std::int32_t line, std::int32_t i) const {
+  const std::int32_t column = over_columns_ ? line : i, row = over_columns_ ? i : line;
+  if (z_m >= kLatticeReachM) return std::numeric_limits<float>::infinity();
+  if (z_m <= grid_.at(column, row).z_m) return 0;
+  // A target is put on the lattice: one step up holds whichever way it is rounded.
+  const double height_m = grid_.height_above_ground_m(column, row, z_m) + kLatticeStepM;
+  const auto rounded = static_cast<float>(height_m);
+  return rounded < height_m ? std::nextafter(rounded, std::numeric_limits<float>::infinity())
+                            : rounded;
+}
+
+float PartSweep::Run::climb_all(std::int32_t line, std::int32_t i) {
+  ++counts_.traced_whole;
+  bool over_void = false;
+  const double z_m = over_columns_ ? sight_.least_z_m(position(line, i), line, i, over_void)
+                                   : sight_.least_z_m(position(line, i), i, line, over_void);
+  return over_void ? std::numeric_limits<float>::quiet_NaN() : height_up_to(z_m, line, i);
+}
+
+/// The highest that any line makes it: those that may be above the highest so far are tried.
+float PartSweep::Run::climb_in_bin(std::int32_t line, std::int32_t i, std::size_t bin) {
+  ++counts_.traced_part;
+  const Position at = position(line, i);
+  const double forwards = picture(at).forwards;
+  const auto below = [](float s) { return s - 4 * kSlopeMargin * std::abs(s); };
+  float least_s = below(low_[bin]);
+  double least_z_m = -std::numeric_limits<double>::infinity();
+  history_.any_line(static_cast<std::int32_t>(bin), bins_, least_s, [&](std::int32_t across) {
+    const double z_m =
+        sight_.least_z_between_m(at, over_columns_ ? line : i, over_columns_ ? i : line,
+                                 over_columns_, across, across - outwards_);
+    if (z_m > least_z_m) {
+      least_z_m = z_m;
+      least_s = std::max(least_s, below(static_cast<float>((z_m - sight_.eye().z_m) / forwards)));
+    }
+    return false;
+  });
+  return height_up_to(least_z_m, line, i);
+}
+
+/// decide, for heights: what is not seen on the ground climbs until it is.
+void PartSweep::Run::climb(const Line& line, const Line* before) {
+  const auto [first, end] = own_range(line);
+  const auto bins = static_cast<float>(bins_);
+  for (std::int32_t k = first; k < end; ++k) {
+    const auto n = static_cast<std::size_t>(k);
+    if (line.is_void[n]) continue;
+    ++counts_.targets;
+    const std::int32_t i = line.first + k;
+    const auto bin = static_cast<std::size_t>(std::clamp(line.t[n], 0.0F, bins - 1));
+    float& to = least_m_[result_index(line.number, i)];
+    if (bounds_hold_ && all_void_[bin])
+      to = std::numeric_limits<float>::quiet_NaN();
+    else if (!bounds_hold_ || some_void_[bin] || (before && crosses_before(*before, i, line.t[n])))
+      to = climb_all(line.number, i);
+    else if (line.s[n] >= high_[bin] + kSlopeMargin * std::abs(line.s[n]))
+      to = 0;
+    else
+      to = climb_in_bin(line.number, i, bin);
   }
 }
 
@@ -895,7 +979,10 @@ void PartSweep::Run::sweep_line(std::int32_t line, bool is_first) {
   if (bins_ != bins_before && !is_first && before_->is_whole) find_edges(*before_);
   fill(*line_, line);
   const Line* before = is_first ? nullptr : before_;
-  decide(*line_, before);
+  if (least_m_.empty())
+    decide(*line_, before);
+  else
+    climb(*line_, before);
   if (line_->is_whole && (!before || before->is_whole))
     add_whole(*line_, before);
   else
@@ -907,49 +994,106 @@ PartSweep::PartSweep(const GridSight& sight, const SweepGround& ground, double t
                      const SampleWindow& window)
     : sight_(sight), ground_(ground), target_height_m_(target_height_m), window_(window) {}
 
-SweepCounts PartSweep::run(const SweepPart& part, std::span<Sight> result) {
-  return Run(*this, part, result).run();
+SweepCounts PartSweep::run(const SweepPart& part, std::span<Seen> result) {
+  return Run(*this, part, result, {}).run();
 }
 
-SweepCounts sweep_viewshed(const GroundGrid& grid, const Position& eye, double target_height_m,
-                           const SampleWindow& window, std::span<Sight> result) {
-  const auto columns = static_cast<std::size_t>(grid.columns());
-  assert(result.size() == columns * static_cast<std::size_t>(grid.rows()));
-  const GridSight sight(grid, eye);
-  if (window.last_column < window.first_column) return {};
+SweepCounts PartSweep::run_heights(const SweepPart& part, std::span<float> least_m) {
+  return Run(*this, part, {}, least_m).run();
+}
+
+namespace {
+
+constexpr std::size_t kWedges = 4;
+constexpr auto kParts = static_cast<std::size_t>(SweepPart::kPartsInWedge);
+
+template <typename Value>
+void fill_window(const GroundGrid& grid, const SampleWindow& window, Value value,
+                 std::span<Value> result) {
   parallel_for(
       static_cast<std::size_t>(window.last_row - window.first_row + 1), [&](std::size_t r) {
         const auto begin = result.begin() + static_cast<std::ptrdiff_t>(
                                                 r + static_cast<std::size_t>(window.first_row)) *
                                                 grid.columns();
-        std::fill(begin + window.first_column, begin + window.last_column + 1, Sight::kUnknown);
+        std::fill(begin + window.first_column, begin + window.last_column + 1, value);
       });
-  const SweepGround ground(grid, sight.frame(), target_height_m);
-  constexpr std::size_t kWedges = 4;
-  constexpr auto kParts = static_cast<std::size_t>(SweepPart::kPartsInWedge);
+}
+
+/// Runs all parts on all threads. @param run  (part) -> counts
+template <typename RunPart>
+SweepCounts for_parts(const RunPart& run) {
   std::array<SweepCounts, kWedges * kParts> counts;
   parallel_for(counts.size(), [&](std::size_t i) {
-    const SweepPart part{static_cast<SweepPart::Wedge>(i % kWedges),
-                         static_cast<std::int32_t>(i / kWedges)};
-    counts[i] = PartSweep(sight, ground, target_height_m, window).run(part, result);
+    counts[i] = run(SweepPart{static_cast<SweepPart::Wedge>(i % kWedges),
+                              static_cast<std::int32_t>(i / kWedges)});
   });
   SweepCounts sum;
   for (const SweepCounts& of_part : counts) sum.add(of_part);
-  // The sample under the eye belongs to no part.
+  return sum;
+}
+
+/// The known sample of the window that lies under the eye, which belongs to no part.
+struct Under {
+  std::int32_t column = 0, row = 0;
+};
+std::optional<Under> sample_under(const GridSight& sight, const SampleWindow& window) {
+  const GroundGrid& grid = sight.grid();
   const auto near = [](double at, std::int32_t count) {
     return static_cast<std::int32_t>(std::lround(std::clamp(at, 0.0, count - 1.0)));
   };
-  const std::int32_t column = near(sight.frame().eye_column, grid.columns());
-  const std::int32_t row = near(sight.frame().eye_row, grid.rows());
-  const Position p = grid.at(column, row);
-  if (sight.frame().across(p.x_m, p.y_m) == 0 && sight.frame().down(p.x_m, p.y_m) == 0 &&
-      window.contains(column, row) && grid.is_known(column, row)) {
-    result[static_cast<std::size_t>(row) * columns + static_cast<std::size_t>(column)] =
-        sight.judge(grid.raised(column, row, target_height_m), column, row);
-    ++sum.targets;
-    ++sum.traced_whole;
+  const Under under{near(sight.frame().eye_column, grid.columns()),
+                    near(sight.frame().eye_row, grid.rows())};
+  const Position p = grid.at(under.column, under.row);
+  if (sight.frame().across(p.x_m, p.y_m) != 0 || sight.frame().down(p.x_m, p.y_m) != 0 ||
+      !window.contains(under.column, under.row) || !grid.is_known(under.column, under.row))
+    return {};
+  return under;
+}
+
+std::size_t index_in(const GroundGrid& grid, const Under& under) {
+  return static_cast<std::size_t>(under.row) * static_cast<std::size_t>(grid.columns()) +
+         static_cast<std::size_t>(under.column);
+}
+
+}  // namespace
+
+SweepCounts sweep_viewshed(const GroundGrid& grid, const Position& eye, double target_height_m,
+                           const SampleWindow& window, std::span<Seen> result) {
+  assert(result.size() ==
+         static_cast<std::size_t>(grid.columns()) * static_cast<std::size_t>(grid.rows()));
+  if (window.last_column < window.first_column || window.last_row < window.first_row) return {};
+  const GridSight sight(grid, eye);
+  const SweepGround ground(grid, sight.frame(), target_height_m);
+  fill_window(grid, window, Seen::kUnknown, result);
+  SweepCounts counts = for_parts([&](const SweepPart& part) {
+    return PartSweep(sight, ground, target_height_m, window).run(part, result);
+  });
+  if (const auto under = sample_under(sight, window)) {
+    result[index_in(grid, *under)] = sight.judge(
+        grid.raised(under->column, under->row, target_height_m), under->column, under->row);
+    ++counts.targets;
+    ++counts.traced_whole;
   }
-  return sum;
+  return counts;
+}
+
+SweepCounts sweep_heights(const GroundGrid& grid, const Position& eye, const SampleWindow& window,
+                          std::span<float> least_m) {
+  assert(least_m.size() ==
+         static_cast<std::size_t>(grid.columns()) * static_cast<std::size_t>(grid.rows()));
+  if (window.last_column < window.first_column || window.last_row < window.first_row) return {};
+  const GridSight sight(grid, eye);
+  const SweepGround ground(grid, sight.frame(), 0);
+  fill_window(grid, window, std::numeric_limits<float>::quiet_NaN(), least_m);
+  SweepCounts counts = for_parts([&](const SweepPart& part) {
+    return PartSweep(sight, ground, 0, window).run_heights(part, least_m);
+  });
+  if (const auto under = sample_under(sight, window)) {
+    const bool above = grid.at(under->column, under->row).z_m <= eye.z_m;
+    least_m[index_in(grid, *under)] = above ? 0 : std::numeric_limits<float>::infinity();
+    ++counts.targets;
+  }
+  return counts;
 }
 
 }  // namespace scarp

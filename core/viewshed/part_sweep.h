@@ -61,7 +61,13 @@ class PartSweep {
 
   /// @param result[out]  [rows * columns]; the part's known samples in the window are written,
   /// others left
-  SweepCounts run(const SweepPart& part, std::span<Sight> result);
+  SweepCounts run(const SweepPart& part, std::span<Seen> result);
+
+  /// Instead: how high above each sample, along its normal, a target must be at least to be seen.
+  /// @param least_m[out]  [rows * columns] metres, rounded up (by less than 1 mm and float's own
+  ///                      step); 0 where the ground is seen, NaN where the line is over void
+  ///                      ground, infinite above an eye under ground
+  SweepCounts run_heights(const SweepPart& part, std::span<float> least_m);
 
  private:
   struct Line;
@@ -73,9 +79,13 @@ class PartSweep {
   SampleWindow window_;
 };
 
+/// PartSweep::run_heights for all parts; NaN where a sample is void.
+SweepCounts sweep_heights(const GroundGrid& grid, const Position& eye, const SampleWindow& window,
+                          std::span<float> least_m);
+
 /// All parts on all threads. The same bits for any number of threads.
 /// @param result[out]  [rows * columns]; the window is written, kUnknown where the sample is void
 SweepCounts sweep_viewshed(const GroundGrid& grid, const Position& eye, double target_height_m,
-                           const SampleWindow& window, std::span<Sight> result);
+                           const SampleWindow& window, std::span<Seen> result);
 
 }  // namespace scarp

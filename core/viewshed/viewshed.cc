@@ -25,14 +25,14 @@ void for_rows(const SampleWindow& window, const Body& body) {
 }
 
 void keep_within(const GroundGrid& grid, const EyeBearings& bearings, const ViewshedEye& eye,
-                 const SampleWindow& window, std::span<Sight> sight) {
+                 const SampleWindow& window, std::span<Seen> sight) {
   for_rows(window, [&](std::int32_t row) {
     for (std::int32_t column = window.first_column; column <= window.last_column; ++column) {
-      Sight& at = sight[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.columns()) +
-                        static_cast<std::size_t>(column)];
-      if (at == Sight::kHidden || !grid.is_known(column, row)) continue;
+      Seen& at = sight[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.columns()) +
+                       static_cast<std::size_t>(column)];
+      if (at == Seen::kHidden || !grid.is_known(column, row)) continue;
       if (!within(eye.limits, bearings.to(grid.raised(column, row, eye.target_height_m))))
-        at = Sight::kHidden;
+        at = Seen::kHidden;
     }
   });
 }
@@ -40,7 +40,7 @@ void keep_within(const GroundGrid& grid, const EyeBearings& bearings, const View
 }  // namespace
 
 SampleWindow view_from(const GroundGrid& grid, const std::optional<EarthFrame>& earth,
-                       const ViewshedEye& eye, std::span<Sight> sight, SweepCounts* counts) {
+                       const ViewshedEye& eye, std::span<Seen> sight, SweepCounts* counts) {
   const EyeBearings bearings(eye.position, earth);
   const bool bounded = eye.limits.max_distance_m < std::numeric_limits<double>::infinity();
   const SampleWindow window =
@@ -58,17 +58,17 @@ AnyEye::AnyEye(const GroundGrid& grid)
   for_rows(whole_window(grid), [&](std::int32_t row) {
     for (std::int32_t column = 0; column < grid.columns(); ++column)
       sight_[static_cast<std::size_t>(row) * columns_ + static_cast<std::size_t>(column)] =
-          grid.is_known(column, row) ? Sight::kHidden : Sight::kUnknown;
+          grid.is_known(column, row) ? Seen::kHidden : Seen::kUnknown;
   });
 }
 
-void AnyEye::add(const SampleWindow& window, std::span<const Sight> sight) {
+void AnyEye::add(const SampleWindow& window, std::span<const Seen> sight) {
   for_rows(window, [&](std::int32_t row) {
     const std::size_t begin = static_cast<std::size_t>(row) * columns_;
     for (std::size_t i = begin + static_cast<std::size_t>(window.first_column);
          i <= begin + static_cast<std::size_t>(window.last_column); ++i) {
-      if (sight[i] == Sight::kVisible || sight_[i] == Sight::kHidden) {
-        if (sight[i] != Sight::kHidden) sight_[i] = sight[i];
+      if (sight[i] == Seen::kVisible || sight_[i] == Seen::kHidden) {
+        if (sight[i] != Seen::kHidden) sight_[i] = sight[i];
       }
     }
   });
@@ -84,12 +84,12 @@ EyeCount::EyeCount(const GroundGrid& grid)
   });
 }
 
-void EyeCount::add(const SampleWindow& window, std::span<const Sight> sight) {
+void EyeCount::add(const SampleWindow& window, std::span<const Seen> sight) {
   for_rows(window, [&](std::int32_t row) {
     const std::size_t begin = static_cast<std::size_t>(row) * columns_;
     for (std::size_t i = begin + static_cast<std::size_t>(window.first_column);
          i <= begin + static_cast<std::size_t>(window.last_column); ++i)
-      if (sight[i] == Sight::kVisible) ++counts_[i];
+      if (sight[i] == Seen::kVisible) ++counts_[i];
   });
 }
 

@@ -26,7 +26,7 @@ struct ViewshedEye {
 /// @return the window within reach; outside it nothing is within the limits
 /// Cost: see PartSweep; with limits besides distance, a bearing for each sample seen.
 SampleWindow view_from(const GroundGrid& grid, const std::optional<EarthFrame>& earth,
-                       const ViewshedEye& eye, std::span<Sight> sight,
+                       const ViewshedEye& eye, std::span<Seen> sight,
                        SweepCounts* counts = nullptr);
 
 /// Seen by any of the eyes so far: visible where one sees it, otherwise unknown where that
@@ -35,12 +35,12 @@ class AnyEye {
  public:
   /// Nothing seen yet: hidden, and unknown where void.
   explicit AnyEye(const GroundGrid& grid);
-  void add(const SampleWindow& window, std::span<const Sight> sight);
-  std::span<const Sight> sight() const { return sight_; }
+  void add(const SampleWindow& window, std::span<const Seen> sight);
+  std::span<const Seen> sight() const { return sight_; }
 
  private:
   std::size_t columns_;
-  std::vector<Sight> sight_;
+  std::vector<Seen> sight_;
 };
 
 /// By how many of the eyes so far a sample is seen for certain.
@@ -49,7 +49,7 @@ class EyeCount {
   static constexpr std::uint32_t kVoid = 0xFFFFFFFF;  ///< where the sample is void
 
   explicit EyeCount(const GroundGrid& grid);
-  void add(const SampleWindow& window, std::span<const Sight> sight);
+  void add(const SampleWindow& window, std::span<const Seen> sight);
   std::span<const std::uint32_t> counts() const { return counts_; }
 
  private:

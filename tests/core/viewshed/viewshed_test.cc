@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 #include <vector>
 
@@ -16,15 +17,15 @@ using test::GroundRecipe;
 using test::random_ground;
 using test::Relief;
 
-std::vector<Sight> judged(const GroundGrid& grid, const Position& eye, double target_m) {
-  std::vector<Sight> sight(static_cast<std::size_t>(grid.columns() * grid.rows()));
+std::vector<Seen> judged(const GroundGrid& grid, const Position& eye, double target_m) {
+  std::vector<Seen> sight(static_cast<std::size_t>(grid.columns() * grid.rows()));
   exhaustive_viewshed(grid, eye, target_m, sight);
   return sight;
 }
 
-std::vector<Sight> swept(const GroundGrid& grid, const Position& eye, double target_m,
-                         SweepCounts* counts = nullptr) {
-  std::vector<Sight> sight(static_cast<std::size_t>(grid.columns() * grid.rows()));
+std::vector<Seen> swept(const GroundGrid& grid, const Position& eye, double target_m,
+                        SweepCounts* counts = nullptr) {
+  std::vector<Seen> sight(static_cast<std::size_t>(grid.columns() * grid.rows()));
   const SweepCounts c = sweep_viewshed(grid, eye, target_m, whole_window(grid), sight);
   if (counts) *counts = c;
   return sight;
@@ -121,6 +122,46 @@ TEST(SweepViewshed, EqualsTheJudgeOnEveryCell) {
                 << i % static_cast<std::size_t>(size) << " row "
                 << i / static_cast<std::size_t>(size) << " eye " << eye.x_m << ' ' << eye.y_m << ' '
                 << eye.z_m;
+        }
+      }
+    }
+  }
+}
+
+/// A target at the least height is seen, and one two millimetres lower is not.
+TEST(SweepHeights, AreTheLeastAtWhichATargetIsSeen) {
+  for (const GroundRecipe& recipe : recipes()) {
+    const GroundGrid grid = random_ground(recipe);
+    std::mt19937 random(recipe.seed);
+    std::vector<float> least_m(static_cast<std::size_t>(grid.columns() * grid.rows()));
+    for (const Position& eye : eyes_for(grid, random, 8)) {
+      sweep_heights(grid, eye, whole_window(grid), least_m);
+      const GridSight judge(grid, eye);
+      for (std::int32_t r = 0; r < grid.rows(); ++r) {
+        for (std::int32_t c = 0; c < grid.columns(); ++c) {
+          const float h = least_m[static_cast<std::size_t>(r * grid.columns() + c)];
+          if (!grid.is_known(c, r)) {
+            EXPECT_TRUE(std::isnan(h));
+            continue;
+          }
+          const auto sight_at = [&](double height_m) {
+            return judge.judge(grid.raised(c, r, height_m), c, r);
+          };
+          // Rounding to float may add its own step.
+          const double step_m = 0.002 + h * 1e-6;
+          if (std::isnan(h)) {
+            ASSERT_NE(sight_at(1e6), Seen::kVisible);
+          } else if (std::isinf(h)) {
+            ASSERT_EQ(sight_at(1e6), Seen::kHidden);
+          } else {
+            ASSERT_EQ(sight_at(h), Seen::kVisible)
+                << "relief " << static_cast<int>(recipe.relief) << " bend " << recipe.bend
+                << " height " << h << " column " << c << " row " << r << " eye " << eye.x_m << ' '
+                << eye.y_m << ' ' << eye.z_m;
+            if (h > step_m) {
+              ASSERT_EQ(sight_at(h - step_m), Seen::kHidden) << "height " << h;
+            }
+          }
         }
       }
     }
