@@ -16,6 +16,7 @@
 #include "cli/progress_bar.h"
 #include "cli/stage_clock.h"
 #include "core/error/error.h"
+#include "core/memory/large_array.h"
 #include "core/threads/parallel_for.h"
 #include "ingest/observers/observers.h"
 #include "tiles/layers/geotiff.h"
@@ -173,7 +174,7 @@ class ViewshedRun {
       least_.emplace(grid);
       eye_heights_m_.resize(samples);
     } else {
-      sight_.resize(samples);
+      sight_ = LargeArray<Seen>(samples);
     }
     if (options_.mode == ViewshedMode::kCount) count_.emplace(grid);
     // One eye that looks everywhere leaves nothing to be put together.
@@ -195,9 +196,9 @@ class ViewshedRun {
       window_ = heights_from(ground_.grid, earth, eye, eye_heights_m_, &counts);
       least_->add(window_, eye_heights_m_);
     } else {
-      window_ = view_from(ground_.grid, earth, eye, sight_, &counts);
-      if (count_) count_->add(window_, sight_);
-      if (any_) any_->add(window_, sight_);
+      window_ = view_from(ground_.grid, earth, eye, sight_.span(), &counts);
+      if (count_) count_->add(window_, sight_.span());
+      if (any_) any_->add(window_, sight_.span());
     }
     decided_.add(counts);
   }
@@ -219,14 +220,12 @@ class ViewshedRun {
       write_heights(path, alone.heights_m(), i, i + 1);
     } else {
       AnyEye alone(ground_.grid);
-      alone.add(window_, sight_);
+      alone.add(window_, sight_.span());
       write_values(path, alone.sight(), i, i + 1);
     }
   }
 
-  std::span<const Seen> seen() const {
-    return any_ ? any_->sight() : std::span<const Seen>(sight_);
-  }
+  std::span<const Seen> seen() const { return any_ ? any_->sight() : sight_.span(); }
 
   void write() {
     if (least_) {
@@ -405,7 +404,7 @@ class ViewshedRun {
   StageClock clock_;
   Ground ground_;
   std::vector<RunEye> eyes_;
-  std::vector<Seen> sight_;
+  LargeArray<Seen> sight_;
   std::optional<AnyEye> any_;
   std::optional<EyeCount> count_;
   std::optional<LeastHeight> least_;
