@@ -113,6 +113,13 @@ void add_viewshed(CLI::App& app, ViewshedOptions& o, std::function<int()>& run) 
        },
        "An eye at X,Y[,H]: H metres above ground (2), or as 1200asl; may be repeated")
       ->allow_extra_args(false);
+  c->add_option(
+      "--observers", o.observers_file,
+      "Eyes from points of any file that OGR reads. Attributes: name, height or elevation, "
+      "target_height, max_distance (or radius), min_distance, azimuth_from, azimuth_to, "
+      "pitch_low, pitch_high; the options hold for what is missing");
+  c->add_option("--each", o.each_folder,
+                "A folder for a raster of each eye besides: its name, or 0001.tif and so on");
   c->add_option("--crs", o.crs, "CRS of the observers, such as OGC:CRS84; the DEM's unless given");
   c->add_option("--target-height", o.target_height_m, "Metres above ground of what is looked for")
       ->check(CLI::Range(0.0, 100'000.0));
@@ -128,9 +135,14 @@ void add_viewshed(CLI::App& app, ViewshedOptions& o, std::function<int()>& run) 
       "--pitch", [&o](const std::string& text) { o.pitch_deg = parse_range("--pitch", text); },
       "LOWEST,HIGHEST: degrees above the level plane of the eye");
   c->add_option("--mode", o.mode,
-                "visible: seen by an eye; count: by how many eyes; visible unless given")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, ViewshedMode>{
-          {"visible", ViewshedMode::kVisible}, {"count", ViewshedMode::kCount}}));
+                "visible: seen by an eye; count: by how many eyes; ground: least height above "
+                "ground at which a target is seen, metres; dem: the same as elevation; visible "
+                "unless given")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, ViewshedMode>{{"visible", ViewshedMode::kVisible},
+                                              {"count", ViewshedMode::kCount},
+                                              {"ground", ViewshedMode::kGround},
+                                              {"dem", ViewshedMode::kDem}}));
   c->add_flag("--gdal-values", o.gdal_values, "Write 255 for visible, as gdal_viewshed does");
   add_surface(*c, o.dem);
   add_common(*c, o.common);

@@ -50,33 +50,34 @@ MapPoint converted(const TypedPosition& typed, const std::string& crs, const Geo
 
 }  // namespace
 
-GroundEye place_eye(const TypedPosition& typed, const std::string& crs, const Ground& ground) {
+GroundEye place_eye(const MapPoint& point, bool above_datum, const std::string& text,
+                    const Ground& ground) {
   const Dem& dem = ground.dem;
   GroundEye eye;
-  eye.map = converted(typed, crs, *dem.frame);
+  eye.map = point;
   const GeoFrame::Placer placer(*dem.frame);
   const double column =
-      snapped((eye.map.x - dem.geotransform[0]) / dem.geotransform[1] - 0.5, dem.columns);
-  const double row =
-      snapped((eye.map.y - dem.geotransform[3]) / dem.geotransform[5] - 0.5, dem.rows);
+      snapped((point.x - dem.geotransform[0]) / dem.geotransform[1] - 0.5, dem.columns);
+  const double row = snapped((point.y - dem.geotransform[3]) / dem.geotransform[5] - 0.5, dem.rows);
   const bool inside = column >= 0 && column <= dem.columns - 1 && row >= 0 && row <= dem.rows - 1;
-  if (!typed.above_datum) {
+  const double undulation_m = placer.undulation_m(point.x, point.y);
+  if (!above_datum) {
     const auto ground_m = inside ? ground_height_m(ground.grid, column, row) : std::nullopt;
     if (!ground_m)
-      throw Error(
-          ErrorCode::kInput,
-          fmt::format("position '{}': {}; a place on known ground was expected; check the "
-                      "order X,Y and --crs, or give an absolute height such as "
-                      "{:.10g},{:.10g},1200asl",
-                      typed.text, inside ? "the ground is void there" : "is outside the data",
-                      typed.x, typed.y));
-    eye.map.height_m += *ground_m - placer.undulation_m(eye.map.x, eye.map.y);
+      throw Error(ErrorCode::kInput,
+                  fmt::format("position '{}': {}; a place on known ground was expected; check the "
+                              "order X,Y and --crs, or give an absolute height, such as 1200asl "
+                              "for H",
+                              text, inside ? "the ground is void there" : "is outside the data"));
+    eye.map.height_m += *ground_m - undulation_m;
   }
-  eye.position =
-      inside ? ground.grid.place(column, row,
-                                 eye.map.height_m + placer.undulation_m(eye.map.x, eye.map.y))
-             : placer.place(eye.map);
+  eye.position = inside ? ground.grid.place(column, row, eye.map.height_m + undulation_m)
+                        : placer.place(eye.map);
   return eye;
+}
+
+GroundEye place_eye(const TypedPosition& typed, const std::string& crs, const Ground& ground) {
+  return place_eye(converted(typed, crs, *ground.dem.frame), typed.above_datum, typed.text, ground);
 }
 
 }  // namespace scarp

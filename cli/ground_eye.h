@@ -14,6 +14,11 @@ struct GroundEye {
   MapPoint map;       ///< in the CRS of the data; height above its height datum
 };
 
+/// Places a point of the CRS of the data. @param text  the position as given, for messages
+/// Throws as place_eye.
+GroundEye place_eye(const MapPoint& point, bool above_datum, const std::string& text,
+                    const Ground& ground);
+
 /// Places a typed position. Over the data its plan position is between its samples' as they are
 /// placed, and ground is bilinear; outside the data it is placed by the CRS.
 /// @param crs  of the position; empty: the data's

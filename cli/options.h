@@ -60,7 +60,9 @@ struct ViewshedOptions {
   std::vector<std::string> dem_files;
   std::string output;
   std::vector<TypedPosition> observers;
-  std::string crs;  ///< of the observers; empty: the data's
+  std::string observers_file;
+  std::string each_folder;  ///< a raster for each eye goes here
+  std::string crs;          ///< of the observers; empty: the data's
   ViewshedMode mode = ViewshedMode::kVisible;
   double target_height_m = 0;
   double min_distance_m = 0;

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -14,6 +16,9 @@
 #include "cli/progress_bar.h"
 #include "cli/stage_clock.h"
 #include "core/error/error.h"
+#include "core/memory/large_array.h"
+#include "core/threads/parallel_for.h"
+#include "ingest/observers/observers.h"
 #include "tiles/layers/geotiff.h"
 
 namespace scarp {
@@ -26,27 +31,75 @@ double azimuth_rad(double degrees) {
   return (turn < 0 ? turn + 360 : turn) * kRadiansPerDegree;
 }
 
-ViewLimits limits_of(const ViewshedOptions& options) {
+/// One eye of the run.
+struct RunEye {
+  GroundEye at;
+  double target_height_m = 0;
   ViewLimits limits;
-  limits.min_distance_m = options.min_distance_m;
-  if (options.max_distance_m) limits.max_distance_m = *options.max_distance_m;
+  std::string name;
+};
+
+using Range = std::optional<std::pair<double, double>>;
+
+ViewLimits limits_of(double min_distance_m, std::optional<double> max_distance_m,
+                     const Range& azimuth_deg, const Range& pitch_deg) {
+  ViewLimits limits;
+  limits.min_distance_m = min_distance_m;
+  if (max_distance_m) limits.max_distance_m = *max_distance_m;
   // A range of a whole turn has no limit; otherwise its ends would fall on each other.
-  if (options.azimuth_deg &&
-      std::abs(options.azimuth_deg->second - options.azimuth_deg->first) < 360) {
-    limits.azimuth_begin_rad = azimuth_rad(options.azimuth_deg->first);
-    limits.azimuth_end_rad = azimuth_rad(options.azimuth_deg->second);
+  if (azimuth_deg && std::abs(azimuth_deg->second - azimuth_deg->first) < 360) {
+    limits.azimuth_begin_rad = azimuth_rad(azimuth_deg->first);
+    limits.azimuth_end_rad = azimuth_rad(azimuth_deg->second);
   }
-  if (options.pitch_deg) {
-    limits.min_pitch_rad = options.pitch_deg->first * kRadiansPerDegree;
-    limits.max_pitch_rad = options.pitch_deg->second * kRadiansPerDegree;
+  if (pitch_deg) {
+    limits.min_pitch_rad = pitch_deg->first * kRadiansPerDegree;
+    limits.max_pitch_rad = pitch_deg->second * kRadiansPerDegree;
   }
   return limits;
 }
 
+/// An eye from a file; the options hold for what it leaves out.
+RunEye eye_of(const ObserverRecord& record, const ViewshedOptions& options, const Ground& ground) {
+  RunEye eye;
+  const double height_m = record.height_m.value_or(TypedPosition().height_m);
+  eye.at = place_eye({record.x, record.y, record.elevation_m.value_or(height_m)},
+                     record.elevation_m.has_value(),
+                     fmt::format("{}{}{:.10g},{:.10g}", record.name, record.name.empty() ? "" : " ",
+                                 record.x, record.y),
+                     ground);
+  eye.target_height_m = record.target_height_m.value_or(options.target_height_m);
+  Range azimuth_deg = options.azimuth_deg, pitch_deg = options.pitch_deg;
+  if (record.azimuth_from_deg)
+    azimuth_deg = std::pair(*record.azimuth_from_deg, *record.azimuth_to_deg);
+  if (record.pitch_lowest_deg || record.pitch_highest_deg) {
+    const auto otherwise = pitch_deg.value_or(std::pair(-90.0, 90.0));
+    pitch_deg = std::pair(record.pitch_lowest_deg.value_or(otherwise.first),
+                          record.pitch_highest_deg.value_or(otherwise.second));
+  }
+  eye.limits = limits_of(record.min_distance_m.value_or(options.min_distance_m),
+                         record.max_distance_m ? record.max_distance_m : options.max_distance_m,
+                         azimuth_deg, pitch_deg);
+  eye.name = record.name;
+  return eye;
+}
+
+const char* name_of(ViewshedMode mode) {
+  switch (mode) {
+    case ViewshedMode::kCount:
+      return "count";
+    case ViewshedMode::kGround:
+      return "ground";
+    case ViewshedMode::kDem:
+      return "dem";
+    default:
+      return "visible";
+  }
+}
+
 /// Wrong use shows before any work.
 void check_options(const ViewshedOptions& options) {
-  if (options.observers.empty())
-    throw Error(ErrorCode::kUsage, "no eye: --observer X,Y[,H] was expected");
+  if (options.observers.empty() && options.observers_file.empty())
+    throw Error(ErrorCode::kUsage, "no eye: --observer X,Y[,H] or --observers FILE was expected");
   if (options.max_distance_m && options.min_distance_m > *options.max_distance_m)
     throw Error(ErrorCode::kUsage,
                 fmt::format("--min-distance {} is greater than --max-distance {}; nothing lies "
@@ -62,6 +115,11 @@ void check_options(const ViewshedOptions& options) {
     throw Error(ErrorCode::kInput,
                 fmt::format("'{}': exists; a new file was expected; give --overwrite to replace it",
                             options.output));
+  if (!options.each_folder.empty() && !std::filesystem::is_directory(options.each_folder))
+    throw Error(ErrorCode::kInput,
+                fmt::format("'{}': is no folder; one for the rasters of --each was expected; make "
+                            "it first",
+                            options.each_folder));
 }
 
 /// One run from options to a finished raster, a member function a stage.
@@ -94,73 +152,170 @@ class ViewshedRun {
     dem.memory_budget_bytes = options_.common.memory_budget_bytes;
     ground_ = read_ground(options_.dem_files, dem, progress);
     for (const TypedPosition& typed : options_.observers)
-      eyes_.push_back(place_eye(typed, options_.crs, ground_));
+      eyes_.push_back({place_eye(typed, options_.crs, ground_), options_.target_height_m,
+                       limits_of(options_.min_distance_m, options_.max_distance_m,
+                                 options_.azimuth_deg, options_.pitch_deg),
+                       ""});
+    if (options_.observers_file.empty()) return;
+    const std::string& wkt = ground_.dem.frame->description().crs_wkt;
+    for (const ObserverRecord& record : read_observers(options_.observers_file, wkt, options_.crs))
+      eyes_.push_back(eye_of(record, options_, ground_));
+  }
+
+  bool measures_heights() const {
+    return options_.mode == ViewshedMode::kGround || options_.mode == ViewshedMode::kDem;
   }
 
   void see(const Progress& progress) {
     const GroundGrid& grid = ground_.grid;
-    const auto earth = ground_.dem.frame->earth_frame();
-    sight_.resize(static_cast<std::size_t>(grid.columns()) * static_cast<std::size_t>(grid.rows()));
-    const bool counting = options_.mode == ViewshedMode::kCount;
-    if (counting) count_.emplace(grid);
+    const std::size_t samples =
+        static_cast<std::size_t>(grid.columns()) * static_cast<std::size_t>(grid.rows());
+    if (measures_heights()) {
+      least_.emplace(grid);
+      eye_heights_m_.resize(samples);
+    } else {
+      sight_ = LargeArray<Seen>(samples);
+    }
+    if (options_.mode == ViewshedMode::kCount) count_.emplace(grid);
     // One eye that looks everywhere leaves nothing to be put together.
-    const bool alone = eyes_.size() == 1 && !options_.max_distance_m && !counting;
-    if (!alone && !counting) any_.emplace(grid);
+    const bool alone = eyes_.size() == 1 &&
+                       !(eyes_[0].limits.max_distance_m < std::numeric_limits<double>::infinity());
+    if (options_.mode == ViewshedMode::kVisible && !alone) any_.emplace(grid);
     for (std::size_t i = 0; i < eyes_.size(); ++i) {
-      const ViewshedEye eye{eyes_[i].position, options_.target_height_m, limits_of(options_)};
-      SweepCounts counts;
-      const SampleWindow window = view_from(grid, earth, eye, sight_, &counts);
-      decided_.add(counts);
-      if (count_) count_->add(window, sight_);
-      if (any_) any_->add(window, sight_);
+      see_from(eyes_[i]);
+      if (!options_.each_folder.empty()) write_each(i);
       if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(eyes_.size()));
     }
   }
 
-  std::span<const Seen> seen() const {
-    return any_ ? any_->sight() : std::span<const Seen>(sight_);
+  void see_from(const RunEye& from) {
+    const auto earth = ground_.dem.frame->earth_frame();
+    const ViewshedEye eye{from.at.position, from.target_height_m, from.limits};
+    SweepCounts counts;
+    if (least_) {
+      window_ = heights_from(ground_.grid, earth, eye, eye_heights_m_, &counts);
+      least_->add(window_, eye_heights_m_);
+    } else {
+      window_ = view_from(ground_.grid, earth, eye, sight_.span(), &counts);
+      if (count_) count_->add(window_, sight_.span());
+      if (any_) any_->add(window_, sight_.span());
+    }
+    decided_.add(counts);
   }
+
+  Existing existing() const {
+    return options_.common.overwrite ? Existing::kReplace : Existing::kRefuse;
+  }
+
+  /// The raster of the eye that was last seen from.
+  void write_each(std::size_t i) {
+    std::string name = eyes_[i].name;
+    for (char& c : name)
+      if (c == '/' || c == '\\' || c == '\0') c = '_';
+    if (name.empty() || name.front() == '.') name = fmt::format("{:04}", i + 1);
+    const std::string path = fmt::format("{}/{}.tif", options_.each_folder, name);
+    if (least_) {
+      LeastHeight alone(ground_.grid);
+      alone.add(window_, eye_heights_m_);
+      write_heights(path, alone.heights_m(), i, i + 1);
+    } else {
+      AnyEye alone(ground_.grid);
+      alone.add(window_, sight_.span());
+      write_values(path, alone.sight(), i, i + 1);
+    }
+  }
+
+  std::span<const Seen> seen() const { return any_ ? any_->sight() : sight_.span(); }
 
   void write() {
-    RasterLayer layer;
-    if (count_) {
-      layer = layer_over(ground_.dem, count_->counts(), "eyes that see it");
+    if (least_) {
+      write_heights(options_.output, least_->heights_m(), 0, eyes_.size());
+    } else if (count_) {
+      RasterLayer layer = layer_over(ground_.dem, count_->counts(), "eyes that see it");
       layer.nodata = EyeCount::kVoid;
+      layer.metadata["VALUES"] = "number of eyes that see it; 4294967295 void";
+      write_layer(options_.output, layer, 0, eyes_.size());
     } else {
-      write_values(layer);
+      write_values(options_.output, seen(), 0, eyes_.size());
     }
-    describe(layer.metadata);
-    write_geotiff_cog(options_.output, layer,
-                      options_.common.overwrite ? Existing::kReplace : Existing::kRefuse);
   }
 
-  void write_values(RasterLayer& layer) {
-    const std::span<const Seen> sight = seen();
+  void write_layer(const std::string& path, RasterLayer& layer, std::size_t first,
+                   std::size_t end) const {
+    describe(layer.metadata, first, end);
+    write_geotiff_cog(path, layer, existing());
+  }
+
+  /// @param first, end  the eyes that the raster is of
+  void write_values(const std::string& path, std::span<const Seen> sight, std::size_t first,
+                    std::size_t end) {
     const std::span<const std::uint8_t> bytes(reinterpret_cast<const std::uint8_t*>(sight.data()),
                                               sight.size());
-    if (!options_.gdal_values) {
+    RasterLayer layer;
+    if (options_.gdal_values) {
+      gdal_values_.resize(bytes.size());
+      std::transform(sight.begin(), sight.end(), gdal_values_.begin(), [](Seen s) {
+        return static_cast<std::uint8_t>(s == Seen::kVisible ? 255 : 0);
+      });
+      layer = layer_over(ground_.dem, std::span<const std::uint8_t>(gdal_values_), "visible");
+      layer.metadata["VALUES"] = "255 visible, 0 hidden or unknown";
+    } else {
       layer = layer_over(ground_.dem, bytes, "visible");
       layer.nodata = 255;
       layer.colours = {{{70, 80, 96, 255}, {250, 196, 60, 255}}};
       layer.metadata["VALUES"] = "1 visible, 0 hidden, 255 unknown";
-      return;
     }
-    gdal_values_.resize(bytes.size());
-    std::transform(sight.begin(), sight.end(), gdal_values_.begin(),
-                   [](Seen s) { return static_cast<std::uint8_t>(s == Seen::kVisible ? 255 : 0); });
-    layer = layer_over(ground_.dem, std::span<const std::uint8_t>(gdal_values_), "visible");
-    layer.metadata["VALUES"] = "255 visible, 0 hidden or unknown";
+    write_layer(path, layer, first, end);
+  }
+
+  void write_heights(const std::string& path, std::span<float> least_m, std::size_t first,
+                     std::size_t end) {
+    const bool as_elevation = options_.mode == ViewshedMode::kDem;
+    if (as_elevation) add_ground(least_m);
+    RasterLayer layer = layer_over(ground_.dem, std::span<const float>(least_m),
+                                   as_elevation ? "least elevation seen" : "least height seen");
+    layer.unit = "m";
+    layer.nodata = std::numeric_limits<double>::quiet_NaN();
+    layer.metadata["VALUES"] =
+        as_elevation ? "least elevation at which a target is seen, rounded up; NaN unknown or out "
+                       "of the limits"
+                     : "least height above ground at which a target is seen, rounded up; NaN "
+                       "unknown or out of the limits";
+    write_layer(path, layer, first, end);
+  }
+
+  /// Heights above ground become heights above the datum of the data, rounded up.
+  void add_ground(std::span<float> least_m) const {
+    const GroundGrid& grid = ground_.grid;
+    const Dem& dem = ground_.dem;
+    const bool has_geoid = !dem.frame->description().geoid_file.empty();
+    parallel_for(static_cast<std::size_t>(grid.rows()), [&](std::size_t r) {
+      const auto row = static_cast<std::int32_t>(r);
+      const std::optional<GeoFrame::Placer> placer =
+          has_geoid ? std::optional<GeoFrame::Placer>(std::in_place, *dem.frame) : std::nullopt;
+      for (std::int32_t c = 0; c < grid.columns(); ++c) {
+        float& at =
+            least_m[r * static_cast<std::size_t>(grid.columns()) + static_cast<std::size_t>(c)];
+        if (std::isnan(at)) continue;
+        const double elevation_m = grid.height_m(c, row) + at -
+                                   (placer ? placer->undulation_m(dem.x_of(c), dem.y_of(row)) : 0);
+        const auto rounded = static_cast<float>(elevation_m);
+        at = rounded < elevation_m ? std::nextafter(rounded, std::numeric_limits<float>::infinity())
+                                   : rounded;
+      }
+    });
   }
 
   /// What the run was, for whoever opens the raster.
-  void describe(std::map<std::string, std::string>& metadata) const {
+  void describe(std::map<std::string, std::string>& metadata, std::size_t first,
+                std::size_t end) const {
     const FrameDescription& frame = ground_.dem.frame->description();
     constexpr std::size_t kMostNamed = 32;
     std::string observers;
-    for (std::size_t i = 0; i < std::min(eyes_.size(), kMostNamed); ++i)
-      observers += fmt::format("{}{:.10g},{:.10g},{:.3f}asl", i ? " " : "", eyes_[i].map.x,
-                               eyes_[i].map.y, eyes_[i].map.height_m);
-    metadata["MODE"] = count_ ? "count" : "visible";
+    for (std::size_t i = first; i < std::min(end, first + kMostNamed); ++i)
+      observers += fmt::format("{}{:.10g},{:.10g},{:.3f}asl", i > first ? " " : "",
+                               eyes_[i].at.map.x, eyes_[i].at.map.y, eyes_[i].at.map.height_m);
+    metadata["MODE"] = name_of(options_.mode);
     metadata["SURFACE"] = "grid";
     metadata["EARTH"] = frame.earth == Earth::kFlat ? "flat" : "ellipsoid";
     metadata["REFRACTION"] = fmt::format("{:g}", frame.refraction);
@@ -168,9 +323,13 @@ class ViewshedRun {
                           : frame.geoid_file.empty()  ? "taken as ellipsoidal"
                                                       : "geoid added";
     metadata["HEIGHT_UNIT_OF_DEM"] = ground_.dem.height_unit;
-    metadata["OBSERVERS"] = std::to_string(eyes_.size());
+    metadata["OBSERVERS"] = std::to_string(end - first);
     metadata["OBSERVER"] = observers;
-    metadata["TARGET_HEIGHT_M"] = fmt::format("{:g}", options_.target_height_m);
+    if (!options_.observers_file.empty())
+      metadata["OBSERVERS_FILE"] =
+          std::filesystem::path(options_.observers_file).filename().string();
+    if (!measures_heights())
+      metadata["TARGET_HEIGHT_M"] = fmt::format("{:g}", options_.target_height_m);
     if (options_.min_distance_m > 0)
       metadata["MIN_DISTANCE_M"] = fmt::format("{:g}", options_.min_distance_m);
     if (options_.max_distance_m)
@@ -189,7 +348,11 @@ class ViewshedRun {
                              {"columns", ground_.grid.columns()},
                              {"rows", ground_.grid.rows()},
                              {"observers", eyes_.size()}};
-    if (count_) {
+    if (least_) {
+      const auto heights_m = least_->heights_m();
+      result["unknown_samples"] =
+          std::count_if(heights_m.begin(), heights_m.end(), [](float h) { return std::isnan(h); });
+    } else if (count_) {
       const auto counts = count_->counts();
       const auto is_void = [](std::uint32_t n) { return n == EyeCount::kVoid; };
       result["void_samples"] = std::count_if(counts.begin(), counts.end(), is_void);
@@ -222,7 +385,10 @@ class ViewshedRun {
       fmt::print("{}\n", result.dump(2));
       return;
     }
-    if (count_) {
+    if (least_) {
+      fmt::print("{}: heights of {} samples, {} unknown or out of the limits\n", options_.output,
+                 least_->heights_m().size(), result["unknown_samples"].get<std::size_t>());
+    } else if (count_) {
       fmt::print("{}: {} of {} samples seen by {} eyes\n", options_.output,
                  result["seen_samples"].get<std::size_t>(), count_->counts().size(), eyes_.size());
     } else {
@@ -237,10 +403,13 @@ class ViewshedRun {
   ProgressBar bar_;
   StageClock clock_;
   Ground ground_;
-  std::vector<GroundEye> eyes_;
-  std::vector<Seen> sight_;
+  std::vector<RunEye> eyes_;
+  LargeArray<Seen> sight_;
   std::optional<AnyEye> any_;
   std::optional<EyeCount> count_;
+  std::optional<LeastHeight> least_;
+  std::vector<float> eye_heights_m_;
+  SampleWindow window_;  // of the eye last seen from
   std::vector<std::uint8_t> gdal_values_;
   SweepCounts decided_;
 };

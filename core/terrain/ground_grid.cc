@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "core/threads/parallel_for.h"
+
 namespace scarp {
 namespace {
 
@@ -48,8 +50,14 @@ GroundGrid::GroundGrid(std::int32_t columns, std::int32_t rows, Placement placem
     : columns_(columns),
       rows_(rows),
       stride_(padded_stride(columns)),
-      steps_(stride_ * static_cast<std::size_t>(rows), kVoid),
-      placement_(std::move(placement)) {}
+      steps_(stride_ * static_cast<std::size_t>(rows)),
+      placement_(std::move(placement)) {
+  // On all threads, because touching memory first is what costs.
+  parallel_for(static_cast<std::size_t>(rows), [&](std::size_t row) {
+    const std::span<std::int32_t> samples = steps_.span().subspan(row * stride_, stride_);
+    std::fill(samples.begin(), samples.end(), kVoid);
+  });
+}
 
 GroundGrid::GroundGrid(const SampleGrid& grid)
     : GroundGrid(grid.columns, grid.rows, explicit_placement(grid)) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/geodesy/position.h"
+#include "core/memory/large_array.h"
 #include "core/terrain/sample_grid.h"
 
 namespace scarp {
@@ -130,7 +131,7 @@ class GroundGrid {
   std::int32_t columns_ = 0;
   std::int32_t rows_ = 0;
   std::size_t stride_ = 0;
-  std::vector<std::int32_t> steps_;
+  LargeArray<std::int32_t> steps_;
   Placement placement_;
 };
 

@@ -111,25 +111,45 @@ void take_level_picture(std::size_t count, double forwards, const double* __rest
 
 SCARP_FOR_EACH_TARGET
 float take_rises(std::size_t count, const float* __restrict t, const float* __restrict s,
-                 const std::uint8_t* __restrict is_void, float* __restrict steep) {
+                 const std::uint8_t* __restrict is_void, float* __restrict rise,
+                 float* __restrict steep) {
   if (count == 0) return kAnyGround;
-  steep[count - 1] = 0;
+  const std::size_t segments = count - 1;
+  steep[segments] = rise[segments] = 0;
   float closest = kAnyGround;
-  const auto rise = [&](std::size_t i) {
-    const float difference = std::abs(s[i + 1] - s[i]);
-    return (is_void[i] | is_void[i + 1]) != 0 ? 0.0F : difference;
-  };
-  for (std::size_t i = 0; i + 1 < count; ++i) {
+  for (std::size_t i = 0; i < segments; ++i) {
+    rise[i] = std::abs(s[i + 1] - s[i]);
     const float spacing = t[i + 1] - t[i];
     closest = spacing < closest ? spacing : closest;
   }
-  for (std::size_t i = 1; i + 2 < count; ++i)
-    steep[i] = std::max(rise(i - 1), std::max(rise(i), rise(i + 1)));
-  if (count > 1) {
-    steep[0] = count > 2 ? std::max(rise(0), rise(1)) : rise(0);
-    if (count > 2) steep[count - 2] = std::max(rise(count - 3), rise(count - 2));
-  }
+  if (is_void != nullptr)
+    for (std::size_t i = 0; i < segments; ++i)
+      if ((is_void[i] | is_void[i + 1]) != 0) rise[i] = 0;
+  for (std::size_t i = 1; i < segments; ++i)
+    steep[i] = std::max(rise[i - 1], std::max(rise[i], rise[i + 1]));
+  if (segments > 0) steep[0] = std::max(rise[0], rise[1]);
   return closest;
+}
+
+SCARP_FOR_EACH_TARGET
+bool near_even_places(std::size_t edges, std::size_t count, const float* __restrict t,
+                      float* __restrict place) {
+  const float spacing =
+      (t[count - 1] - t[0]) / static_cast<float>(static_cast<std::int32_t>(count) - 1);
+  const float per_edge = 1 / spacing, begin = -t[0] / spacing;
+  const auto last = static_cast<std::int32_t>(count) - 2;
+  std::int32_t misses = 0;
+  for (std::size_t e = 0; e < edges; ++e) {
+    const auto edge = static_cast<float>(static_cast<std::int32_t>(e));
+    std::int32_t guess = static_cast<std::int32_t>(edge * per_edge + begin);
+    guess = guess < 1 ? 1 : guess;
+    guess = guess > last - 1 ? last - 1 : guess;
+    guess += (t[guess + 1] <= edge ? 1 : 0) - (t[guess] > edge ? 1 : 0);
+    const float from = t[guess], to = t[guess + 1];
+    misses += from > edge || to <= edge ? 1 : 0;
+    place[e] = static_cast<float>(guess) + (edge - from) / (to - from);
+  }
+  return misses == 0;
 }
 
 SCARP_FOR_EACH_TARGET

@@ -47,11 +47,17 @@ void take_level_picture(std::size_t count, double forwards, const double* sidewa
                         const double* z_m, const std::uint8_t* is_void, double eye_z_m,
                         double low_tangent, double bins_per_tangent, float* t, float* s);
 
-/// Rises of s along a polyline: steep[i] is the greatest of the segment after i and its two
-/// neighbours, without those that have a void end.
+/// Rises of s along a polyline: rise[i] of the segment after i, 0 where it has a void end; steep[i]
+/// the greatest of that one and its two neighbours.
+/// @param is_void  null where none is
 /// @return the least distance of neighbours in t
 float take_rises(std::size_t count, const float* t, const float* s, const std::uint8_t* is_void,
-                 float* steep);
+                 float* rise, float* steep);
+
+/// Where bins' edges fall among samples that are nearly even: place[e] is the sample before edge e,
+/// and how far the edge is towards the next. @return false where a first guess misses by more than
+/// one sample; nothing holds then
+bool near_even_places(std::size_t edges, std::size_t count, const float* t, float* place);
 
 /// place[e] = e * per_edge + begin.
 void even_places(std::size_t count, float per_edge, float begin, float* place);

@@ -272,6 +272,7 @@ class PartSweep::Run {
 
   // Room for one line.
   std::vector<double> across_, down_, raised_m_;
+  std::vector<float> rises_;
   std::vector<float> place_before_, higher_, target_t_, target_s_;
   std::vector<float> this_s_, next_s_, edge_low_, edge_high_, line_low_;
   std::vector<std::int32_t> edge_before_;
@@ -575,8 +576,9 @@ void PartSweep::Run::fill(Line& to, std::int32_t line) {
   if (to.t.size() > kSpare && to.t[to.t.size() - 1 - kSpare] > bins) high_bend_ -= kBeyond;
   const auto n = to.t.size();
   to.steep.resize(n);
-  if (take_rises(n, to.t.data(), to.s.data(), to.is_void.data(), to.steep.data()) <
-      kLeastSpacingBins)
+  rises_.resize(n);
+  if (take_rises(n, to.t.data(), to.s.data(), to.has_void ? to.is_void.data() : nullptr,
+                 rises_.data(), to.steep.data()) < kLeastSpacingBins)
     bounds_hold_ = false;
   to.is_whole =
       bounds_hold_ && !to.has_void && n > 4 && to.t[1] < -slack() && to.t[n - 2] > bins + slack();
@@ -596,6 +598,7 @@ void PartSweep::Run::find_edges(Line& to) const {
     even_places(edges, per_bin, begin, to.place.data());
     return;
   }
+  if (near_even_places(edges, to.t.size(), to.t.data(), to.place.data())) return;
   std::size_t j = 0;
   for (std::size_t e = 0; e < edges; ++e) {
     const auto edge = static_cast<float>(static_cast<std::int32_t>(e));

@@ -1,6 +1,8 @@
 #include "core/viewshed/viewshed.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "core/threads/parallel_for.h"
 
@@ -37,15 +39,76 @@ void keep_within(const GroundGrid& grid, const EyeBearings& bearings, const View
   });
 }
 
+SampleWindow window_of(const GroundGrid& grid, const ViewshedEye& eye,
+                       const EyeBearings& bearings) {
+  return eye.limits.max_distance_m < std::numeric_limits<double>::infinity()
+             ? reach_window(grid, eye.position, bearings, eye.limits.max_distance_m)
+             : whole_window(grid);
+}
+
+/// A least height within the limits of pitch, or NaN. Pitch rises with height.
+float climb_to_pitch(const GroundGrid& grid, const EyeBearings& bearings, const ViewLimits& limits,
+                     std::int32_t column, std::int32_t row, float least_m) {
+  const auto pitch_at = [&](double height_m) {
+    return bearings.to(grid.raised(column, row, height_m)).pitch_rad;
+  };
+  constexpr float kNever = std::numeric_limits<float>::quiet_NaN();
+  constexpr double kHighestM = 100'000;
+  if (pitch_at(least_m) < limits.min_pitch_rad) {
+    double low_m = least_m, high_m = kHighestM;
+    if (pitch_at(high_m) < limits.min_pitch_rad) return kNever;
+    while (high_m - low_m > kLatticeStepM / 2) {
+      const double middle_m = (low_m + high_m) / 2;
+      (pitch_at(middle_m) < limits.min_pitch_rad ? low_m : high_m) = middle_m;
+    }
+    least_m = std::nextafter(static_cast<float>(high_m), std::numeric_limits<float>::infinity());
+  }
+  return pitch_at(least_m) > limits.max_pitch_rad ? kNever : least_m;
+}
+
 }  // namespace
+
+SampleWindow heights_from(const GroundGrid& grid, const std::optional<EarthFrame>& earth,
+                          const ViewshedEye& eye, std::span<float> least_m, SweepCounts* counts) {
+  const EyeBearings bearings(eye.position, earth);
+  const SampleWindow window = window_of(grid, eye, bearings);
+  const SweepCounts found = sweep_heights(grid, eye.position, window, least_m);
+  if (counts) *counts = found;
+  for_rows(window, [&](std::int32_t row) {
+    for (std::int32_t column = window.first_column; column <= window.last_column; ++column) {
+      float& at = least_m[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.columns()) +
+                          static_cast<std::size_t>(column)];
+      if (std::isinf(at)) at = std::numeric_limits<float>::quiet_NaN();
+      if (std::isnan(at) || !eye.limits.any()) continue;
+      ViewLimits aside = eye.limits;
+      aside.min_pitch_rad = ViewLimits().min_pitch_rad;
+      aside.max_pitch_rad = ViewLimits().max_pitch_rad;
+      at = within(aside, bearings.to(grid.at(column, row)))
+               ? climb_to_pitch(grid, bearings, eye.limits, column, row, at)
+               : std::numeric_limits<float>::quiet_NaN();
+    }
+  });
+  return window;
+}
+
+LeastHeight::LeastHeight(const GroundGrid& grid)
+    : columns_(static_cast<std::size_t>(grid.columns())),
+      least_m_(columns_ * static_cast<std::size_t>(grid.rows()),
+               std::numeric_limits<float>::quiet_NaN()) {}
+
+void LeastHeight::add(const SampleWindow& window, std::span<const float> least_m) {
+  for_rows(window, [&](std::int32_t row) {
+    const std::size_t begin = static_cast<std::size_t>(row) * columns_;
+    for (std::size_t i = begin + static_cast<std::size_t>(window.first_column);
+         i <= begin + static_cast<std::size_t>(window.last_column); ++i)
+      least_m_[i] = std::fmin(least_m_[i], least_m[i]);
+  });
+}
 
 SampleWindow view_from(const GroundGrid& grid, const std::optional<EarthFrame>& earth,
                        const ViewshedEye& eye, std::span<Seen> sight, SweepCounts* counts) {
   const EyeBearings bearings(eye.position, earth);
-  const bool bounded = eye.limits.max_distance_m < std::numeric_limits<double>::infinity();
-  const SampleWindow window =
-      bounded ? reach_window(grid, eye.position, bearings, eye.limits.max_distance_m)
-              : whole_window(grid);
+  const SampleWindow window = window_of(grid, eye, bearings);
   const SweepCounts found = sweep_viewshed(grid, eye.position, eye.target_height_m, window, sight);
   if (counts) *counts = found;
   if (eye.limits.any()) keep_within(grid, bearings, eye, window, sight);

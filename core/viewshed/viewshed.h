@@ -29,6 +29,14 @@ SampleWindow view_from(const GroundGrid& grid, const std::optional<EarthFrame>& 
                        const ViewshedEye& eye, std::span<Seen> sight,
                        SweepCounts* counts = nullptr);
 
+/// How high above each sample a target must be at least for one eye to see it within its limits,
+/// metres along the normal, rounded up: NaN where that is not known (over void ground) or not to be
+/// had at any height. Distance and azimuth are those of the sample, pitch that of the target.
+/// @param least_m[out]  [rows * columns]; only the window returned is written
+SampleWindow heights_from(const GroundGrid& grid, const std::optional<EarthFrame>& earth,
+                          const ViewshedEye& eye, std::span<float> least_m,
+                          SweepCounts* counts = nullptr);
+
 /// Seen by any of the eyes so far: visible where one sees it, otherwise unknown where that
 /// holds for one.
 class AnyEye {
@@ -55,6 +63,19 @@ class EyeCount {
  private:
   std::size_t columns_;
   std::vector<std::uint32_t> counts_;
+};
+
+/// The least height so far, over the eyes that have one; NaN where none has.
+class LeastHeight {
+ public:
+  explicit LeastHeight(const GroundGrid& grid);
+  void add(const SampleWindow& window, std::span<const float> least_m);
+  std::span<float> heights_m() { return least_m_; }
+  std::span<const float> heights_m() const { return least_m_; }
+
+ private:
+  std::size_t columns_;
+  std::vector<float> least_m_;
 };
 
 }  // namespace scarp

@@ -8,6 +8,7 @@
 #include <cassert>
 
 #include "core/error/error.h"
+#include "core/threads/parallel_for.h"
 #include "tiles/layers/gdal_session.h"
 #include "tiles/layers/spatial_reference.h"
 
@@ -91,6 +92,7 @@ void write_geotiff_cog(const std::string& path, const RasterLayer& layer, Existi
   options.SetNameValue("COMPRESS", "DEFLATE");
   options.SetNameValue("PREDICTOR", data.predictor);
   options.SetNameValue("BIGTIFF", "IF_SAFER");
+  options.SetNameValue("NUM_THREADS", std::to_string(thread_count()).c_str());
   options.SetNameValue("OVERVIEW_RESAMPLING", data.is_float ? "AVERAGE" : "NEAREST");
   GDALDriver* driver = GetGDALDriverManager()->GetDriverByName("COG");
   if (driver == nullptr) session.fail(path);
