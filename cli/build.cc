@@ -8,8 +8,7 @@
 #include "cli/commands.h"
 #include "cli/loaded_scene.h"
 #include "cli/picture_size.h"
-#include "cli/progress_bar.h"
-#include "cli/stage_clock.h"
+#include "cli/stages.h"
 #include "core/culling/visible_groups.h"
 #include "core/error/error.h"
 #include "core/horizon/stewart.h"
@@ -35,34 +34,26 @@ class Build {
  public:
   explicit Build(const BuildOptions& options)
       : options_(options),
-        bar_(!options.common.json),
+        stages_(!options.common.json),
         writer_(options.scene, options.common.overwrite ? Existing::kReplace : Existing::kRefuse) {
     tile_.id = kTile;
   }
 
   void run() {
-    stage("read", [&](const Progress& p) { read(p); });
-    stage("place", [&](const Progress&) { grid_ = place_samples(dem_); });
-    stage("mesh", [&](const Progress& p) { mesh(p); });
-    stage("horizons", [&](const Progress& p) { horizons(p); });
-    stage("groups", [&](const Progress& p) { groups(p); });
-    stage("layers", [&](const Progress& p) { layers(p); });
-    stage("preview", [&](const Progress&) { preview(); });
+    stages_.run("read", [&](const Progress& p) { read(p); });
+    stages_.run("place", [&](const Progress&) { grid_ = place_samples(dem_); });
+    stages_.run("mesh", [&](const Progress& p) { mesh(p); });
+    stages_.run("horizons", [&](const Progress& p) { horizons(p); });
+    stages_.run("groups", [&](const Progress& p) { groups(p); });
+    stages_.run("layers", [&](const Progress& p) { layers(p); });
+    stages_.run("preview", [&](const Progress&) { preview(); });
     finish();
-    bar_.clear();
+    stages_.finish();
   }
 
   const nlohmann::json& report() const { return report_; }
 
  private:
-  template <class Body>
-  void stage(const std::string& name, Body body) {
-    const Progress progress = bar_.stage(name);
-    clock_.begin(name);
-    body(progress);
-    clock_.end();
-  }
-
   void read(const Progress& progress) {
     DemOptions dem = options_.dem;
     dem.memory_budget_bytes = options_.common.memory_budget_bytes;
@@ -187,7 +178,7 @@ class Build {
 
   void finish() {
     report_ = build_report(options_, dem_, mesh_, mesh_options_, groups_, grouping_, observer_,
-                           clock_.costs());
+                           stages_.costs());
     const std::string text = report_.dump(2) + "\n";
     add_layer("report.json", "json", [&](const std::string& path) {
       write_file(path, std::as_bytes(std::span(text)), Existing::kRefuse);
@@ -230,9 +221,8 @@ class Build {
   bool is_flat() const { return dem_.frame->description().earth == Earth::kFlat; }
 
   const BuildOptions& options_;
-  ProgressBar bar_;
+  Stages stages_;
   SceneWriter writer_;
-  StageClock clock_;
   SceneTile tile_;
   std::vector<StoredFile> layers_;
   Dem dem_;

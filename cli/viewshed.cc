@@ -13,8 +13,7 @@
 #include "cli/build/layers.h"
 #include "cli/commands.h"
 #include "cli/ground_eye.h"
-#include "cli/progress_bar.h"
-#include "cli/stage_clock.h"
+#include "cli/stages.h"
 #include "core/error/error.h"
 #include "core/memory/large_array.h"
 #include "core/threads/parallel_for.h"
@@ -126,27 +125,19 @@ void check_options(const ViewshedOptions& options) {
 class ViewshedRun {
  public:
   explicit ViewshedRun(const ViewshedOptions& options)
-      : options_(options), bar_(!options.common.json) {}
+      : options_(options), stages_(!options.common.json) {}
 
   int run() {
     check_options(options_);
-    stage("read", [&](const Progress& progress) { read(progress); });
-    stage("see", [&](const Progress& progress) { see(progress); });
-    stage("write", [&](const Progress&) { write(); });
-    bar_.clear();
+    stages_.run("read", [&](const Progress& progress) { read(progress); });
+    stages_.run("see", [&](const Progress& progress) { see(progress); });
+    stages_.run("write", [&](const Progress&) { write(); });
+    stages_.finish();
     print();
     return 0;
   }
 
  private:
-  template <class Body>
-  void stage(const std::string& name, Body body) {
-    const Progress progress = bar_.stage(name);
-    clock_.begin(name);
-    body(progress);
-    clock_.end();
-  }
-
   void read(const Progress& progress) {
     DemOptions dem = options_.dem;
     dem.memory_budget_bytes = options_.common.memory_budget_bytes;
@@ -379,7 +370,7 @@ class ViewshedRun {
       result["decided"] = {{"targets", decided_.targets},
                            {"compared_with_part", decided_.traced_part},
                            {"judged_whole", decided_.traced_whole}};
-      for (const StageCost& cost : clock_.costs())
+      for (const StageCost& cost : stages_.costs())
         result["stages"].push_back(
             {{"name", cost.name}, {"seconds", cost.seconds}, {"peak_bytes", cost.peak_bytes}});
       fmt::print("{}\n", result.dump(2));
@@ -400,8 +391,7 @@ class ViewshedRun {
   }
 
   const ViewshedOptions& options_;
-  ProgressBar bar_;
-  StageClock clock_;
+  Stages stages_;
   Ground ground_;
   std::vector<RunEye> eyes_;
   LargeArray<Seen> sight_;
