@@ -149,6 +149,58 @@ void add_viewshed(CLI::App& app, ViewshedOptions& o, std::function<int()>& run) 
   c->callback([&] { run = [&o] { return run_viewshed(o); }; });
 }
 
+void add_sources(CLI::App& command, std::vector<std::string>& sources) {
+  command.add_option("source", sources, "A scene, or any rasters of heights that GDAL reads")
+      ->required();
+}
+
+void add_sight(CLI::App& app, SightOptions& o, std::function<int()>& run) {
+  CLI::App* c = app.add_subcommand("sight", "Whether two places see each other, exactly");
+  c->footer(
+      "Examples:\n  scarp sight alps.tif --from 8.65,46.55,2 --to 8.9,46.7,20 --crs OGC:CRS84\n"
+      "  scarp sight alps.tif --from 690000,158000,15 --to 702000,164000,30 --frequency 5.8GHz \\\n"
+      "    -o link.svg\n"
+      "Tells what blocks the line first, how clear it runs, and how high each end must be.");
+  add_sources(*c, o.sources);
+  c->add_option_function<std::string>(
+       "--from", [&o](const std::string& text) { o.from = parse_position(text); },
+       "The eye, X,Y[,H]: H metres above ground (2), or as 1200asl")
+      ->required();
+  c->add_option_function<std::string>(
+       "--to", [&o](const std::string& text) { o.to = parse_position(text); },
+       "The target, in the same way")
+      ->required();
+  c->add_option("--crs", o.crs, "CRS of both, such as OGC:CRS84; that of the data unless given");
+  c->add_option_function<std::string>(
+      "--frequency", [&o](const std::string& text) { o.frequency_hz = parse_frequency(text); },
+      "Of a radio link, such as 5.8GHz: adds the clearance of the first Fresnel zone");
+  c->add_option("-o,--output", o.output, "The profile as a picture, .svg, or as data, .json");
+  add_surface(*c, o.dem);
+  add_common(*c, o.common);
+  c->callback([&] { run = [&o] { return run_sight(o); }; });
+}
+
+void add_horizon(CLI::App& app, HorizonOptions& o, std::function<int()>& run) {
+  CLI::App* c = app.add_subcommand("horizon", "The horizon all around a place, as CSV or JSON");
+  c->footer(
+      "Example:\n  scarp horizon alps.tif --at 8.65,46.55,2 --crs OGC:CRS84 > horizon.csv\n"
+      "A line for each azimuth: the elevation angle under which the highest ground is seen, how\n"
+      "far it is and where. Angles are against the level plane of the eye, below it too.");
+  add_sources(*c, o.sources);
+  c->add_option_function<std::string>("--at", position_into(o.at),
+                                      "The eye, X,Y[,H]: H metres above ground (2), or as 1200asl");
+  c->add_option("--crs", o.crs, "CRS of --at, such as OGC:CRS84; that of the data unless given");
+  c->add_option(
+       "--azimuths", o.azimuths,
+       "Directions, from north clockwise; 360 unless given. True north, grid north without "
+       "a CRS")
+      ->check(CLI::Range(1, 1'000'000));
+  c->add_option("-o,--output", o.output, "A file, .csv or .json; standard output unless given");
+  add_surface(*c, o.dem);
+  add_common(*c, o.common);
+  c->callback([&] { run = [&o] { return run_horizon(o); }; });
+}
+
 void add_cull(CLI::App& app, CullOptions& o, std::function<int()>& run) {
   CLI::App* c = app.add_subcommand("cull", "Which groups a camera can see");
   c->footer("Example:\n  scarp cull alps.scene --camera 8.65,46.55,50 --crs OGC:CRS84 --json");
@@ -232,6 +284,8 @@ int run_command_line(int argc, char** argv) {
   VerifyOptions verify;
   PreviewCommandOptions preview;
   ViewshedOptions viewshed;
+  SightOptions sight;
+  HorizonOptions horizon;
   CheckOptions check;
   std::function<int()> run;
   add_build(app, build, run);
@@ -239,6 +293,8 @@ int run_command_line(int argc, char** argv) {
   add_verify(app, verify, run);
   add_preview(app, preview, run);
   add_viewshed(app, viewshed, run);
+  add_sight(app, sight, run);
+  add_horizon(app, horizon, run);
   add_check(app, check, run);
   try {
     app.parse(argc, argv);
@@ -250,8 +306,9 @@ int run_command_line(int argc, char** argv) {
     return report(e.what(), 2);
   }
   try {
-    for (CommonOptions* common : {&build.common, &cull.common, &verify.common, &preview.common,
-                                  &viewshed.common, &check.common}) {
+    for (CommonOptions* common :
+         {&build.common, &cull.common, &verify.common, &preview.common, &viewshed.common,
+          &sight.common, &horizon.common, &check.common}) {
       if (!common->memory_budget_bytes) common->memory_budget_bytes = machine_memory_bytes() / 2;
       if (common->threads) set_thread_count(common->threads);
     }

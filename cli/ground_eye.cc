@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "core/error/error.h"
 
@@ -19,6 +20,17 @@ double snapped(double index, std::int32_t count) {
   const double near = std::round(index);
   if (std::abs(index - near) < kRoundingCells) index = near;
   return near == 0 || near == count - 1 ? std::clamp(index, 0.0, count - 1.0) : index;
+}
+
+/// Column and row of a map point.
+std::pair<double, double> sample_at(const Dem& dem, const MapPoint& map) {
+  return {snapped((map.x - dem.geotransform[0]) / dem.geotransform[1] - 0.5, dem.columns),
+          snapped((map.y - dem.geotransform[3]) / dem.geotransform[5] - 0.5, dem.rows)};
+}
+
+bool is_inside(const Dem& dem, const MapPoint& map) {
+  const auto [column, row] = sample_at(dem, map);
+  return column >= 0 && column <= dem.columns - 1 && row >= 0 && row <= dem.rows - 1;
 }
 
 /// Bilinear height above the ellipsoid, from the samples that have a share in it.
@@ -50,30 +62,38 @@ MapPoint converted(const TypedPosition& typed, const std::string& crs, const Geo
 
 }  // namespace
 
-GroundEye place_eye(const MapPoint& point, bool above_datum, const std::string& text,
-                    const Ground& ground) {
+GroundEye place_eye(const MapPoint& map, const Ground& ground, const GeoFrame::Placer& placer) {
   const Dem& dem = ground.dem;
   GroundEye eye;
-  eye.map = point;
-  const GeoFrame::Placer placer(*dem.frame);
-  const double column =
-      snapped((point.x - dem.geotransform[0]) / dem.geotransform[1] - 0.5, dem.columns);
-  const double row = snapped((point.y - dem.geotransform[3]) / dem.geotransform[5] - 0.5, dem.rows);
-  const bool inside = column >= 0 && column <= dem.columns - 1 && row >= 0 && row <= dem.rows - 1;
-  const double undulation_m = placer.undulation_m(point.x, point.y);
-  if (!above_datum) {
-    const auto ground_m = inside ? ground_height_m(ground.grid, column, row) : std::nullopt;
-    if (!ground_m)
-      throw Error(ErrorCode::kInput,
-                  fmt::format("position '{}': {}; a place on known ground was expected; check the "
-                              "order X,Y and --crs, or give an absolute height, such as 1200asl "
-                              "for H",
-                              text, inside ? "the ground is void there" : "is outside the data"));
-    eye.map.height_m += *ground_m - undulation_m;
+  eye.map = map;
+  const auto [column, row] = sample_at(dem, map);
+  if (!is_inside(dem, map)) {
+    eye.position = placer.place(map);
+    return eye;
   }
-  eye.position = inside ? ground.grid.place(column, row, eye.map.height_m + undulation_m)
-                        : placer.place(eye.map);
+  const double undulation_m = placer.undulation_m(map.x, map.y);
+  eye.position = ground.grid.place(column, row, map.height_m + undulation_m);
+  if (const auto ground_m = ground_height_m(ground.grid, column, row))
+    eye.ground_m = *ground_m - undulation_m;
   return eye;
+}
+
+GroundEye place_eye(const MapPoint& point, bool above_datum, const std::string& text,
+                    const Ground& ground) {
+  const GeoFrame::Placer placer(*ground.dem.frame);
+  if (above_datum) return place_eye(point, ground, placer);
+  const std::optional<double> ground_m =
+      is_inside(ground.dem, point) ? place_eye({point.x, point.y, 0}, ground, placer).ground_m
+                                   : std::nullopt;
+  if (!ground_m)
+    throw Error(ErrorCode::kInput,
+                fmt::format("position '{}': {}; a place on known ground was expected; check the "
+                            "order X,Y and --crs, or give an absolute height, such as 1200asl "
+                            "for H",
+                            text,
+                            is_inside(ground.dem, point) ? "the ground is void there"
+                                                         : "is outside the data"));
+  return place_eye({point.x, point.y, point.height_m + *ground_m}, ground, placer);
 }
 
 GroundEye place_eye(const TypedPosition& typed, const std::string& crs, const Ground& ground) {

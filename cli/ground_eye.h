@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "cli/options.h"
@@ -10,8 +11,9 @@ namespace scarp {
 
 /// An eye over a DEM.
 struct GroundEye {
-  Position position;  ///< of the frame, on the same normals as the samples
-  MapPoint map;       ///< in the CRS of the data; height above its height datum
+  Position position;               ///< of the frame, on the same normals as the samples
+  MapPoint map;                    ///< in the CRS of the data; height above its height datum
+  std::optional<double> ground_m;  ///< the ground's height there, in the same way; none over void
 };
 
 /// Places a point of the CRS of the data. @param text  the position as given, for messages
@@ -26,5 +28,8 @@ GroundEye place_eye(const MapPoint& point, bool above_datum, const std::string& 
 /// Throws Error{kInput} where the CRS is not known, and where a height above ground is asked for
 /// outside the data or over void ground.
 GroundEye place_eye(const TypedPosition& typed, const std::string& crs, const Ground& ground);
+
+/// The same for a point in the CRS of the data, its height above the height datum.
+GroundEye place_eye(const MapPoint& map, const Ground& ground, const GeoFrame::Placer& placer);
 
 }  // namespace scarp

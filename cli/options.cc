@@ -63,6 +63,26 @@ std::pair<double, double> parse_range(const std::string& option, const std::stri
   return {*from, *to};
 }
 
+double parse_frequency(const std::string& text) {
+  std::string_view rest = text;
+  const auto value = take_number(rest);
+  double factor = 1;
+  if (take(rest, "k"))
+    factor = 1e3;
+  else if (take(rest, "M"))
+    factor = 1e6;
+  else if (take(rest, "G"))
+    factor = 1e9;
+  take(rest, "Hz");
+  // From long waves to light; beyond it is a slip.
+  if (!value || !rest.empty() || *value * factor < 1e3 || *value * factor > 1e15)
+    throw Error(ErrorCode::kUsage,
+                fmt::format("--frequency {}: not understood; hertz between 1e3 and 1e15 were "
+                            "expected, such as 5.8GHz or 868MHz",
+                            text));
+  return *value * factor;
+}
+
 std::uint64_t parse_bytes(const std::string& text) {
   std::string_view rest = text;
   const auto value = take_number(rest);

@@ -72,6 +72,26 @@ struct ViewshedOptions {
   bool gdal_values = false;                              ///< 255 visible, 0 hidden
 };
 
+struct SightOptions {
+  CommonOptions common;
+  DemOptions dem;
+  std::vector<std::string> sources;  ///< a scene, or DEM files
+  TypedPosition from, to;
+  std::string crs;  ///< of both; empty: the data's
+  std::optional<double> frequency_hz;
+  std::string output;  ///< .svg or .json; empty: none
+};
+
+struct HorizonOptions {
+  CommonOptions common;
+  DemOptions dem;
+  std::vector<std::string> sources;  ///< a scene, or DEM files
+  std::optional<TypedPosition> at;
+  std::string crs;  ///< of `at`; empty: the data's
+  int azimuths = 360;
+  std::string output;  ///< .csv or .json; empty: standard output
+};
+
 struct CullOptions {
   CommonOptions common;
   std::string scene;
@@ -111,6 +131,9 @@ TypedPosition parse_position(const std::string& text);
 
 /// Reads "A,B", two numbers. Throws Error{kUsage} that names the option.
 std::pair<double, double> parse_range(const std::string& option, const std::string& text);
+
+/// Reads "5.8GHz", "868MHz", "2.4e9" and the like as hertz. Throws Error{kUsage}.
+double parse_frequency(const std::string& text);
 
 /// Reads "2GiB", "512M", "1000000" and the like as bytes. Throws Error{kUsage}.
 std::uint64_t parse_bytes(const std::string& text);

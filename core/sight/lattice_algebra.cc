@@ -16,6 +16,21 @@ int compare(const Fraction& a, const Fraction& b) {
   return difference.sign();
 }
 
+Fraction crossing_in_plan(const Position& a, const Position& b, const Position& u,
+                          const Position& v) {
+  const LatticeVector along = vector_from(u, v);
+  const Int128 before = cross_in_plan(along, vector_from(u, a));
+  const Int128 after = cross_in_plan(along, vector_from(u, b));
+  return {before < 0 ? -before : before, after < 0 ? -after : after};
+}
+
+Fraction place_in_plan(const Position& a, const Position& b, const Position& p) {
+  const bool along_x = a.x_m != b.x_m;
+  const LatticeVector from_a = vector_from(a, p), to_b = vector_from(p, b);
+  const Int128 before = along_x ? from_a.x : from_a.y, after = along_x ? to_b.x : to_b.y;
+  return {before < 0 ? -before : before, after < 0 ? -after : after};
+}
+
 double to_double(const Fraction& f) {
   return static_cast<double>(f.before) /
          (static_cast<double>(f.before) + static_cast<double>(f.after));

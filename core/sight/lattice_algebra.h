@@ -53,6 +53,14 @@ inline constexpr Fraction kLastEnd{1, 0};
 /// -1, 0 or +1: a lies before, at or behind b. Exact.
 int compare(const Fraction& a, const Fraction& b);
 
+/// Where along a -> b, which crosses the line through u and v in plan, it does so. Exact.
+/// Requires that a and b lie on different sides of that line, or one of them on it.
+Fraction crossing_in_plan(const Position& a, const Position& b, const Position& u,
+                          const Position& v);
+
+/// Where along a -> b a place p lies that is known to lie on it in plan. Exact.
+Fraction place_in_plan(const Position& a, const Position& b, const Position& p);
+
 /// The fraction in double; relative error below 2^-51.
 double to_double(const Fraction& f);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <vector>
 
 #include "core/geodesy/predicates.h"
@@ -45,36 +46,24 @@ bool is_between(const Position& a, const Position& b, const Position& p) {
   return a.x_m != b.x_m ? strictly(a.x_m, p.x_m, b.x_m) : strictly(a.y_m, p.y_m, b.y_m);
 }
 
-/// Place along a -> b, within it, where it crosses the line through u and v in plan.
-Fraction crossing(const Position& a, const Position& b, const Position& u, const Position& v) {
-  const LatticeVector along = vector_from(u, v);
-  const Int128 before = cross_in_plan(along, vector_from(u, a));
-  const Int128 after = cross_in_plan(along, vector_from(u, b));
-  return {before < 0 ? -before : before, after < 0 ? -after : after};
-}
-
-/// A place along the line where ground stands strictly above it.
-struct Obstacle {
-  Fraction at;
+/// A place along the line where an edge, or a vertex (from == to), crosses it in plan.
+struct Meeting {
   VertexIndex from, to;
+  bool above;  ///< strictly above the line
 };
 
-/// Calls found(obstacle) for each vertex and edge strictly above the open segment a-b (not
-/// vertical), until it returns true. An edge that runs along the segment in plan counts by its
-/// vertices and by the triangles at the segment's ends: the highest place over the line is at one
-/// of those.
+/// Calls found(meeting) for each vertex and edge under or above the open segment a-b (not
+/// vertical), until it returns true; those that the floor leaves out may be missing. An edge that
+/// runs along the segment in plan counts by its vertices and by the triangles at the segment's
+/// ends: the highest place over the line is at one of those.
 template <class Found>
-bool visit_obstacles(const TinIndex& index, const Position& a, const Position& b, Found found) {
+bool visit_meetings(const TinIndex& index, const Position& a, const Position& b,
+                    const HeightFloor& floor, Found found) {
   const std::vector<Position>& vertices = index.tin().vertices;
   const std::array<Position, 2> ends{a, b};
-  const HeightFloor floor(a, std::span(ends).last(1));
   const auto visit_vertex = [&](VertexIndex w) {
     const Position& p = vertices[w];
-    if (!is_between(a, b, p) || above_line(a, b, p) <= 0) return false;
-    const bool along_x = a.x_m != b.x_m;
-    const LatticeVector from_a = vector_from(a, p), to_b = vector_from(p, b);
-    const Int128 before = along_x ? from_a.x : from_a.y, after = along_x ? to_b.x : to_b.y;
-    return found({{before < 0 ? -before : before, after < 0 ? -after : after}, w, w});
+    return is_between(a, b, p) && found(Meeting{w, w, above_line(a, b, p) > 0});
   };
   return index.visit_edges(ends, floor, [&](std::uint32_t e) {
     const MeshEdge& edge = index.edges()[e];
@@ -87,9 +76,22 @@ bool visit_obstacles(const TinIndex& index, const Position& a, const Position& b
     if (u_side * v_side == 0 || orient2d(u, v, a) * orient2d(u, v, b) >= 0) return false;
     // Where v lies on the left, a-u-v is counter-clockwise, and the edge is above the line exactly
     // where b lies below their plane; where v lies on the right, the sign is the other one.
-    if (orient3d(a, u, v, b) * v_side >= 0) return false;
-    return found({crossing(a, b, u, v), edge.from, edge.to});
+    return found(Meeting{edge.from, edge.to, orient3d(a, u, v, b) * v_side < 0});
   });
+}
+
+Fraction place_of(const Tin& tin, const Position& a, const Position& b, const Meeting& meeting) {
+  const Position& u = tin.vertices[meeting.from];
+  return meeting.from == meeting.to ? place_in_plan(a, b, u)
+                                    : crossing_in_plan(a, b, u, tin.vertices[meeting.to]);
+}
+
+/// Calls found(meeting) for each vertex and edge strictly above the open segment a-b.
+template <class Found>
+bool visit_obstacles(const TinIndex& index, const Position& a, const Position& b, Found found) {
+  const HeightFloor floor(a, std::span(&b, 1));
+  return visit_meetings(index, a, b, floor,
+                        [&](const Meeting& meeting) { return meeting.above && found(meeting); });
 }
 
 /// The stretch of a-b in plan that lies over the closed triangle.
@@ -106,7 +108,7 @@ std::optional<Stretch> stretch_over(const Tin& tin, TriangleIndex t, const Posit
     const int a_side = orient2d(u, v, a), b_side = orient2d(u, v, b);
     if (a_side < 0 && b_side < 0) return {};
     if (a_side >= 0 && b_side >= 0) continue;
-    const Fraction at = crossing(a, b, u, v);
+    const Fraction at = crossing_in_plan(a, b, u, v);
     if (a_side < 0 && compare(stretch.first, at) < 0) stretch.first = at;
     if (b_side < 0 && compare(at, stretch.last) < 0) stretch.last = at;
   }
@@ -141,7 +143,7 @@ BorderContacts border_contacts(const TinIndex& index, const Position& a, const P
     } else if (u_side * v_side == 0) {
       contacts.grazes = true;
     } else {
-      const Fraction at = crossing(a, b, u, v);
+      const Fraction at = crossing_in_plan(a, b, u, v);
       std::optional<Fraction>& kept = a_side > 0 ? contacts.first_exit : contacts.last_entry;
       const bool earlier = kept && compare(at, *kept) < 0;
       if (!kept || earlier == (a_side > 0)) kept = at;  // ground lies on the left of an edge
@@ -189,7 +191,7 @@ bool is_strictly_under(const TinIndex& index, const Position& p) {
 bool is_blocked(const TinIndex& index, const Position& a, const Position& b) {
   if (same_place(a, b)) return is_strictly_under(index, a.z_m < b.z_m ? a : b);
   return starts_under_ground(index, a, b) || starts_under_ground(index, b, a) ||
-         visit_obstacles(index, a, b, [](const Obstacle&) { return true; });
+         visit_obstacles(index, a, b, [](const Meeting&) { return true; });
 }
 
 Sight line_of_sight(const TinIndex& index, const Position& a, const Position& b) {
@@ -205,15 +207,52 @@ std::optional<Blocker> first_blocker(const TinIndex& index, const Position& a, c
     return Blocker{a.z_m <= b.z_m ? 0.0 : 1.0, kNone, kNone};
   }
   if (starts_under_ground(index, a, b)) return Blocker{0, kNone, kNone};
-  std::optional<Obstacle> nearest;
-  visit_obstacles(index, a, b, [&](const Obstacle& obstacle) {
-    const int order = nearest ? compare(obstacle.at, nearest->at) : -1;
-    if (order < 0) nearest = obstacle;
+  std::optional<Fraction> nearest;
+  Meeting blocker{kNone, kNone, true};
+  visit_obstacles(index, a, b, [&](const Meeting& meeting) {
+    const Fraction at = place_of(index.tin(), a, b, meeting);
+    if (nearest && compare(at, *nearest) >= 0) return false;
+    nearest = at;
+    blocker = meeting;
     return false;
   });
-  if (nearest) return Blocker{to_double(nearest->at), nearest->from, nearest->to};
+  if (nearest) return Blocker{to_double(*nearest), blocker.from, blocker.to};
   if (starts_under_ground(index, b, a)) return Blocker{1, kNone, kNone};
   return {};
+}
+
+GroundAlong ground_along(const TinIndex& index, const Position& a, const Position& b) {
+  assert(!same_place(a, b));
+  const Tin& tin = index.tin();
+  GroundAlong along;
+  visit_meetings(index, a, b, HeightFloor(), [&](const Meeting& meeting) {
+    const Position& u = tin.vertices[meeting.from];
+    const Position& v = tin.vertices[meeting.to];
+    double z_m = u.z_m;
+    if (meeting.from != meeting.to)
+      z_m += to_double(crossing_in_plan(u, v, a, b)) * (v.z_m - u.z_m);
+    along.crossings.push_back({place_of(tin, a, b, meeting), z_m, meeting.above, false});
+    return false;
+  });
+  auto& crossings = along.crossings;
+  const auto before = [](const GroundCrossing& c, const GroundCrossing& d) {
+    return compare(c.at, d.at) < 0;
+  };
+  std::sort(crossings.begin(), crossings.end(), before);
+  const auto same = [](const GroundCrossing& c, const GroundCrossing& d) {
+    return compare(c.at, d.at) == 0;
+  };
+  crossings.erase(std::unique(crossings.begin(), crossings.end(), same), crossings.end());
+  const bool from_hole = is_over_enclosed_void(index, a);
+  for (std::size_t i = 0; i < crossings.size(); ++i) {
+    const double from = i == 0 ? 0 : to_double(crossings[i - 1].at);
+    const Position middle =
+        round_to_lattice(place_between(a, b, (from + to_double(crossings[i].at)) / 2));
+    crossings[i].void_before =
+        i == 0 ? from_hole : index.triangle_at(middle.x_m, middle.y_m) == kNone;
+  }
+  along.void_at_end = is_over_enclosed_void(index, b);
+  return along;
 }
 
 }  // namespace scarp

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "core/geodesy/position.h"
+#include "core/sight/ground_along.h"
 #include "core/sight/tin_index.h"
 
 namespace scarp {
@@ -46,5 +47,13 @@ struct Blocker {
 /// The blocker nearest to a, or nothing where the line is not blocked. Requires lattice positions.
 /// Cost: as is_blocked, but always all of the line.
 std::optional<Blocker> first_blocker(const TinIndex& index, const Position& a, const Position& b);
+
+/// The ground at every edge and vertex of the mesh under the open segment a-b. A crossing blocks
+/// where first_blocker would find it; ends that are themselves strictly under ground are not among
+/// them. An edge that runs along the segment in plan counts by its vertices.
+/// Void is what could hide ground: enclosed by ground, or between two places of it on the line.
+/// Requires lattice positions at different places in plan.
+/// Cost: all bins along the line, O(c log c) for c crossings.
+GroundAlong ground_along(const TinIndex& index, const Position& a, const Position& b);
 
 }  // namespace scarp

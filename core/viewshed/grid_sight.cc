@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <utility>
+#include <vector>
 
 #include "core/geodesy/predicates.h"
 #include "core/threads/parallel_for.h"
@@ -12,7 +13,8 @@
 namespace scarp {
 namespace {
 
-enum class Meeting { kNone, kBlocked, kVoid };
+/// kNone: they do not cross. kClear: over known ground, on or under the line.
+enum class Meeting { kNone, kClear, kBlocked, kVoid };
 
 bool same_plan(const Position& a, const Position& b) {
   return a.x_m == b.x_m && a.y_m == b.y_m;
@@ -32,7 +34,7 @@ Meeting meet_sample(const Position& eye, const Position& target, const Position&
                     bool known) {
   if (side != 0 || !strictly_between(eye, target, sample)) return Meeting::kNone;
   if (!known) return Meeting::kVoid;
-  return above_line(eye, target, sample) > 0 ? Meeting::kBlocked : Meeting::kNone;
+  return above_line(eye, target, sample) > 0 ? Meeting::kBlocked : Meeting::kClear;
 }
 
 /// The inside of the grid segment u - v against the open segment eye - target.
@@ -43,7 +45,7 @@ Meeting meet_inside(const Position& eye, const Position& target, const Position&
   if (!u_known || !v_known) return Meeting::kVoid;
   // Where the two cross, the ground is above the sight line when v lies above the plane through
   // the sight line and u.
-  return orient3d(eye, target, u, v) * u_side > 0 ? Meeting::kBlocked : Meeting::kNone;
+  return orient3d(eye, target, u, v) * u_side > 0 ? Meeting::kBlocked : Meeting::kClear;
 }
 
 Seen worse(Seen sight, Meeting meeting) {
@@ -235,6 +237,64 @@ Seen GridSight::judge(const Position& target, std::int32_t column, std::int32_t 
   const Walk walk = start_walk(target, column, row, runs_across(target));
   const auto [first, last] = all_lines(walk);
   return walk_lines(walk, first, last);
+}
+
+std::pair<std::int32_t, std::int32_t> GridSight::nearest_sample(const Position& target) const {
+  const PlanFrame at = plan_frame(grid_, target);
+  constexpr double kFarthest = 1e9;  // beyond any grid, within 32 bits
+  return {static_cast<std::int32_t>(std::clamp(std::round(at.eye_column), -kFarthest, kFarthest)),
+          static_cast<std::int32_t>(std::clamp(std::round(at.eye_row), -kFarthest, kFarthest))};
+}
+
+Seen GridSight::judge(const Position& target) const {
+  const auto [column, row] = nearest_sample(target);
+  return judge(target, column, row);
+}
+
+GroundAlong GridSight::ground_along(const Position& target) const {
+  assert(!same_plan(eye_, target));
+  const auto [column, row] = nearest_sample(target);
+  const Walk walk = start_walk(target, column, row, runs_across(target));
+  struct Found {
+    GroundCrossing crossing;
+    bool is_void;
+  };
+  std::vector<Found> found;
+  const auto [first, last] = all_lines(walk);
+  visit_lines(
+      walk, first, last, [&](const Position& u, bool u_known, const Position& v, bool v_known) {
+        const int u_side = walk.side(u);
+        const Meeting meeting =
+            u_side == 0 ? meet_sample(eye_, target, u, 0, u_known)
+                        : meet_inside(eye_, target, u, u_side, u_known, v, walk.side(v), v_known);
+        if (meeting == Meeting::kNone) return true;
+        GroundCrossing crossing;
+        crossing.at =
+            u_side == 0 ? place_in_plan(eye_, target, u) : crossing_in_plan(eye_, target, u, v);
+        crossing.ground_z_m = u.z_m;
+        if (u_side != 0)
+          crossing.ground_z_m += to_double(crossing_in_plan(u, v, eye_, target)) * (v.z_m - u.z_m);
+        crossing.blocks = meeting == Meeting::kBlocked;
+        found.push_back({crossing, meeting == Meeting::kVoid});
+        return true;
+      });
+  std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) {
+    return compare(a.crossing.at, b.crossing.at) < 0;
+  });
+  // A sample is met on its line, and again as the end of segments to the next.
+  const auto same = [](const Found& a, const Found& b) {
+    return compare(a.crossing.at, b.crossing.at) == 0;
+  };
+  found.erase(std::unique(found.begin(), found.end(), same), found.end());
+  GroundAlong along;
+  for (Found& f : found) {
+    if (!f.is_void) {
+      f.crossing.void_before = along.void_at_end;
+      along.crossings.push_back(f.crossing);
+    }
+    along.void_at_end = f.is_void;
+  }
+  return along;
 }
 
 bool GridSight::is_blocked_between(const Position& target, std::int32_t column, std::int32_t row,

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/geodesy/position.h"
+#include "core/sight/ground_along.h"
 #include "core/terrain/ground_grid.h"
 #include "core/viewshed/plan_frame.h"
 
@@ -36,6 +37,13 @@ class GridSight {
   /// Is a target seen that stands at or above a sample?
   /// @param target  GroundGrid::raised(column, row, height)
   Seen judge(const Position& target, std::int32_t column, std::int32_t row) const;
+  /// The same for a target anywhere, as free as the eye.
+  Seen judge(const Position& target) const;
+
+  /// The ground wherever the segment to a target anywhere crosses the grid. A crossing blocks
+  /// exactly where it makes judge say kHidden.
+  /// Requires a target that is not at the eye's place in plan. Cost: as judge.
+  GroundAlong ground_along(const Position& target) const;
 
   /// Does known ground block the target near some of the grid lines that its segment crosses?
   /// Looked at are the lines [first_line, last_line] (either order) and the segments that join
@@ -65,6 +73,7 @@ class GridSight {
   Walk start_walk(const Position& target, std::int32_t column, std::int32_t row,
                   bool over_columns) const;
   bool runs_across(const Position& target) const;
+  std::pair<std::int32_t, std::int32_t> nearest_sample(const Position& target) const;
   template <typename Visit>
   void visit_lines(const Walk& walk, std::int32_t first_line, std::int32_t last_line,
                    const Visit& visit) const;

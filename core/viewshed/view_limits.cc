@@ -68,6 +68,21 @@ Bearing EyeBearings::to(const Position& target) const {
           std::atan2(up_m, level_m)};
 }
 
+double EyeBearings::apparent_pitch_rad(const Position& target) const {
+  if (!earth_) return to(target).pitch_rad;
+  // The tangent as the chord between two places of the ray, so near that it errs by rounding only.
+  constexpr double kReachM = 16;
+  const double run_x = target.x_m - eye_.x_m, run_y = target.y_m - eye_.y_m;
+  const double share = kReachM / std::hypot(run_x, run_y, target.z_m - eye_.z_m);
+  const auto at = [&](double part) {
+    return earth_->frame.unflatten({eye_.x_m + part * run_x, eye_.y_m + part * run_y,
+                                    eye_.z_m + part * (target.z_m - eye_.z_m)});
+  };
+  const EcefPoint behind = at(-share), ahead = at(share);
+  const EcefPoint ray{ahead.x_m - behind.x_m, ahead.y_m - behind.y_m, ahead.z_m - behind.z_m};
+  return std::atan2(dot(ray, up_), std::hypot(dot(ray, east_), dot(ray, north_)));
+}
+
 bool within(const ViewLimits& limits, const Bearing& bearing) {
   if (bearing.distance_m < limits.min_distance_m || bearing.distance_m > limits.max_distance_m)
     return false;

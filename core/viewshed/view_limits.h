@@ -43,6 +43,9 @@ class EyeBearings {
   /// @param earth  nothing for the flat earth
   EyeBearings(const Position& eye, const std::optional<EarthFrame>& earth);
   Bearing to(const Position& target) const;
+  /// Pitch at which the eye sees a target: of the ray where it leaves the eye, which refraction
+  /// bends away from the straight line. Requires a target elsewhere in plan. Error below 1e-8 rad.
+  double apparent_pitch_rad(const Position& target) const;
 
  private:
   Position eye_;

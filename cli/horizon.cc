@@ -1,0 +1,145 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.h"
+#include "cli/progress_bar.h"
+#include "cli/sight_surface.h"
+#include "core/error/error.h"
+#include "core/threads/parallel_for.h"
+#include "core/viewshed/ray_horizon.h"
+#include "core/viewshed/view_limits.h"
+#include "tiles/store/part_file.h"
+
+namespace scarp {
+namespace {
+
+using nlohmann::json;
+
+/// The horizon in one direction; without a place where no known ground lies that way.
+struct HorizonLine {
+  double azimuth_deg = 0;
+  bool over_void = false;
+  bool found = false;
+  double elevation_deg = 0, distance_m = 0;
+  double x = 0, y = 0;  ///< longitude and latitude; map coordinates on the flat earth
+};
+
+std::vector<HorizonLine> horizon_of(const SightSurface& surface, const SightEnd& eye,
+                                    int azimuths) {
+  const GeoFrame& frame = surface.frame();
+  const GeoFrame::Placer placer(frame);
+  // A little beyond the data, so that its border is crossed.
+  const double reach_m = surface.reach_m(eye.position) * 1.001 + 1;
+  const auto count = static_cast<std::size_t>(azimuths);
+  std::vector<HorizonLine> lines(count);
+  std::vector<Position> ends(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    lines[i].azimuth_deg = 360.0 * static_cast<double>(i) / azimuths;
+    const double direction_rad = placer.plane_direction_rad(eye.map, lines[i].azimuth_deg);
+    ends[i] = round_to_lattice(Position{eye.position.x_m + reach_m * std::cos(direction_rad),
+                                        eye.position.y_m + reach_m * std::sin(direction_rad),
+                                        eye.position.z_m});
+  }
+  std::vector<std::optional<RayHorizon>> found(count);
+  parallel_for(count, [&](std::size_t i) {
+    found[i] = ray_horizon(eye.position, ends[i], surface.ground_along(eye.position, ends[i]));
+  });
+  const EyeBearings bearings(eye.position, frame.earth_frame());
+  for (std::size_t i = 0; i < count; ++i) {
+    HorizonLine& line = lines[i];
+    if (!found[i]) continue;
+    const Position& place = found[i]->place;
+    line.found = true;
+    line.over_void = found[i]->over_void;
+    line.elevation_deg = bearings.apparent_pitch_rad(place) * 180 / M_PI;
+    line.distance_m = bearings.to(place).distance_m;
+    const MapPoint at = placer.unplace(place);
+    line.x = at.x;
+    line.y = at.y;
+    if (!frame.earth_frame()) continue;
+    const GeodeticPoint geodetic = placer.geodetic(at.x, at.y);
+    line.x = geodetic.longitude_deg;
+    line.y = geodetic.latitude_deg;
+  }
+  return lines;
+}
+
+json json_of(const SightSurface& surface, const SightEnd& eye,
+             const std::vector<HorizonLine>& lines) {
+  const SurfaceNote note = note_of(surface);
+  const bool flat = !surface.frame().earth_frame();
+  json r = {{"surface", note.surface},
+            {"earth", note.earth},
+            {"refraction", note.refraction},
+            {"heights", note.heights},
+            {"north", flat ? "grid" : "true"},
+            {"at", {{"x", eye.map.x}, {"y", eye.map.y}, {"height_m", eye.map.height_m}}},
+            {"horizon", json::array()}};
+  for (const HorizonLine& line : lines) {
+    json point = {{"azimuth_deg", line.azimuth_deg}, {"elevation_deg", nullptr}};
+    if (line.found) {
+      point["elevation_deg"] = line.elevation_deg;
+      point["distance_m"] = line.distance_m;
+      point[flat ? "x" : "longitude_deg"] = line.x;
+      point[flat ? "y" : "latitude_deg"] = line.y;
+      point["over_void"] = line.over_void;
+    }
+    r["horizon"].push_back(point);
+  }
+  return r;
+}
+
+std::string csv_of(const SightSurface& surface, const std::vector<HorizonLine>& lines) {
+  const bool flat = !surface.frame().earth_frame();
+  std::string csv = fmt::format("azimuth_deg,elevation_deg,distance_m,{},over_void\n",
+                                flat ? "x,y" : "longitude_deg,latitude_deg");
+  for (const HorizonLine& line : lines) {
+    csv += fmt::format("{:.9g},", line.azimuth_deg);
+    if (line.found)
+      csv += fmt::format("{:.6f},{:.3f},{:.{}f},{:.{}f},{}\n", line.elevation_deg, line.distance_m,
+                         line.x, flat ? 3 : 9, line.y, flat ? 3 : 9, line.over_void ? 1 : 0);
+    else
+      csv += ",,,,\n";
+  }
+  return csv;
+}
+
+}  // namespace
+
+int run_horizon(const HorizonOptions& options) {
+  if (!options.at)
+    throw Error(ErrorCode::kUsage,
+                "no place: --at X,Y[,H] was expected; horizons of all points of a DEM are not "
+                "computed by this command yet");
+  const std::string& path = options.output;
+  if (!path.empty() && !path.ends_with(".csv") && !path.ends_with(".json"))
+    throw Error(ErrorCode::kUsage,
+                fmt::format("'{}': a name that ends in .csv or .json was expected", path));
+  std::optional<PartFile> file;
+  if (!path.empty())
+    file.emplace(path, options.common.overwrite ? Existing::kReplace : Existing::kRefuse);
+  ProgressBar bar(!options.common.json);
+  DemOptions dem = options.dem;
+  dem.memory_budget_bytes = options.common.memory_budget_bytes;
+  const auto surface = open_surface(options.sources, dem, bar.stage("read"));
+  const SightEnd eye = surface->place(*options.at, options.crs);
+  const auto lines = horizon_of(*surface, eye, options.azimuths);
+  bar.clear();
+  const auto text = [&](bool as_json) {
+    return as_json ? json_of(*surface, eye, lines).dump(2) + "\n" : csv_of(*surface, lines);
+  };
+  if (file) {
+    const std::string bytes = text(path.ends_with(".json"));
+    file->append(std::as_bytes(std::span(bytes)));
+    file->commit();
+  }
+  if (options.common.json || !file)
+    fmt::print("{}", text(options.common.json));
+  else
+    fmt::print("{}: horizon in {} directions\n", path, lines.size());
+  return 0;
+}
+
+}  // namespace scarp

@@ -1,0 +1,135 @@
+#include "cli/sight_surface.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "cli/ground_eye.h"
+#include "cli/loaded_scene.h"
+#include "core/error/error.h"
+#include "core/sight/line_of_sight.h"
+#include "core/viewshed/grid_sight.h"
+
+namespace scarp {
+namespace {
+
+double plan_distance_m(const Position& a, const Position& b) {
+  return std::hypot(a.x_m - b.x_m, a.y_m - b.y_m);
+}
+
+class GridSurface : public SightSurface {
+ public:
+  explicit GridSurface(Ground ground) : ground_(std::move(ground)), placer_(frame()) {}
+
+  const char* name() const override { return "grid"; }
+  const GeoFrame& frame() const override { return *ground_.dem.frame; }
+
+  SightEnd place(const TypedPosition& typed, const std::string& crs) const override {
+    return end_of(place_eye(typed, crs, ground_));
+  }
+  SightEnd place(const MapPoint& map) const override {
+    return end_of(place_eye(map, ground_, placer_));
+  }
+
+  Sight judge(const Position& a, const Position& b) const override {
+    const Seen seen = GridSight(ground_.grid, a).judge(b);
+    return seen == Seen::kVisible  ? Sight::kVisible
+           : seen == Seen::kHidden ? Sight::kHidden
+                                   : Sight::kUnknown;
+  }
+  GroundAlong ground_along(const Position& a, const Position& b) const override {
+    return GridSight(ground_.grid, a).ground_along(b);
+  }
+  // Only the grid's lines block.
+  bool starts_under_ground(const Position&, const Position&) const override { return false; }
+
+  double reach_m(const Position& from) const override {
+    const GroundGrid& grid = ground_.grid;
+    double reach_m = 0;
+    for (std::int32_t c = 0; c < grid.columns(); ++c)
+      for (const std::int32_t r : {0, grid.rows() - 1})
+        reach_m = std::max(reach_m, plan_distance_m(from, grid.at(c, r)));
+    for (std::int32_t r = 0; r < grid.rows(); ++r)
+      for (const std::int32_t c : {0, grid.columns() - 1})
+        reach_m = std::max(reach_m, plan_distance_m(from, grid.at(c, r)));
+    return reach_m;
+  }
+
+ private:
+  static SightEnd end_of(const GroundEye& eye) { return {eye.position, eye.map, eye.ground_m}; }
+
+  Ground ground_;
+  GeoFrame::Placer placer_;
+};
+
+class TinSurface : public SightSurface {
+ public:
+  explicit TinSurface(const std::string& path) : scene_(path), placer_(scene_.frame) {}
+
+  const char* name() const override { return "tin"; }
+  const GeoFrame& frame() const override { return scene_.frame; }
+
+  SightEnd place(const TypedPosition& typed, const std::string& crs) const override {
+    return place(resolve(typed, crs, scene_.frame, scene_.index));
+  }
+  SightEnd place(const MapPoint& map) const override {
+    return {placer_.place(map), map, ground_height_m(placer_, scene_.index, map.x, map.y)};
+  }
+
+  Sight judge(const Position& a, const Position& b) const override {
+    return line_of_sight(scene_.index, a, b);
+  }
+  GroundAlong ground_along(const Position& a, const Position& b) const override {
+    return scarp::ground_along(scene_.index, a, b);
+  }
+  bool starts_under_ground(const Position& a, const Position& b) const override {
+    const auto blocker = first_blocker(scene_.index, a, b);
+    return blocker && blocker->from == kNone && blocker->fraction == 0;
+  }
+
+  double reach_m(const Position& from) const override {
+    double reach_m = 0;
+    for (const Position& p : scene_.tin.vertices)
+      reach_m = std::max(reach_m, plan_distance_m(from, p));
+    return reach_m;
+  }
+
+ private:
+  LoadedScene scene_;
+  GeoFrame::Placer placer_;
+};
+
+}  // namespace
+
+std::unique_ptr<SightSurface> open_surface(const std::vector<std::string>& sources,
+                                           const DemOptions& options, const Progress& progress) {
+  const auto scene = std::find_if(sources.begin(), sources.end(), is_scene);
+  if (scene == sources.end())
+    return std::make_unique<GridSurface>(read_ground(sources, options, progress));
+  if (sources.size() > 1)
+    throw Error(ErrorCode::kUsage,
+                fmt::format("'{}': is a scene; it was expected alone, or DEM files", *scene));
+  if (options.earth || options.refraction != 0 || !options.geoid_file.empty() ||
+      options.height_unit || options.nodata)
+    throw Error(ErrorCode::kUsage,
+                fmt::format("'{}': is a scene, which has its earth, refraction, geoid, unit and "
+                            "void; leave --earth, --refraction, --geoid, --height-unit and "
+                            "--nodata out, or build it again with them",
+                            *scene));
+  return std::make_unique<TinSurface>(*scene);
+}
+
+SurfaceNote note_of(const SightSurface& surface) {
+  const FrameDescription& frame = surface.frame().description();
+  SurfaceNote note;
+  note.surface = surface.name();
+  note.earth = frame.earth == Earth::kFlat ? "flat" : "ellipsoid";
+  note.heights = frame.earth == Earth::kFlat ? "above the map plane"
+                 : frame.geoid_file.empty()  ? "taken as ellipsoidal"
+                                             : "geoid added";
+  note.refraction = frame.refraction;
+  return note;
+}
+
+}  // namespace scarp

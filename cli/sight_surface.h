@@ -1,0 +1,63 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/options.h"
+#include "core/sight/ground_along.h"
+#include "core/sight/line_of_sight.h"
+#include "ingest/crs/geo_frame.h"
+#include "ingest/dem/dem.h"
+
+namespace scarp {
+
+/// An end of a sight line.
+struct SightEnd {
+  Position position;
+  MapPoint map;                    ///< in the CRS of the data; height above its height datum
+  std::optional<double> ground_m;  ///< the ground's height there, in the same way; none over void
+
+  /// Nothing where the ground is not known.
+  std::optional<double> above_ground_m() const {
+    return ground_m ? std::optional(map.height_m - *ground_m) : std::nullopt;
+  }
+};
+
+/// A surface that sight lines are judged on: the `tin` of a scene, or the `grid` of DEMs.
+class SightSurface {
+ public:
+  virtual ~SightSurface() = default;
+
+  virtual const char* name() const = 0;
+  virtual const GeoFrame& frame() const = 0;
+
+  /// Throws Error{kInput} where a height above ground is asked for and there is none.
+  virtual SightEnd place(const TypedPosition& typed, const std::string& crs) const = 0;
+  virtual SightEnd place(const MapPoint& map) const = 0;
+
+  virtual Sight judge(const Position& a, const Position& b) const = 0;
+  /// Requires different places in plan.
+  virtual GroundAlong ground_along(const Position& a, const Position& b) const = 0;
+  /// Whether the line leaves a into the ground right away.
+  virtual bool starts_under_ground(const Position& a, const Position& b) const = 0;
+
+  /// No ground lies farther from a place than this, in plan.
+  virtual double reach_m(const Position& from) const = 0;
+};
+
+/// Throws Error: what a scene or a DEM throws; kUsage where options for reading a DEM are given
+/// with a scene, or a scene is not alone.
+std::unique_ptr<SightSurface> open_surface(const std::vector<std::string>& sources,
+                                           const DemOptions& options, const Progress& progress);
+
+/// What the surface and the frame are, for every output: {"surface", "earth", "refraction",
+/// "heights"}.
+struct SurfaceNote {
+  std::string surface, earth, heights;
+  double refraction = 0;
+};
+SurfaceNote note_of(const SightSurface& surface);
+
+}  // namespace scarp
