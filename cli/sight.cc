@@ -218,9 +218,10 @@ class SightRun {
     return points;
   }
 
-  static std::string height_text(const std::optional<double>& least_m, bool known) {
-    if (least_m) return fmt::format("{:.2f} m", *least_m);
-    return known ? "more than any" : "not known (no ground there)";
+  static std::string height_text(const SightEnd& end, const std::optional<double>& least_m) {
+    if (!end.ground_m) return "not known, no ground there";
+    return least_m ? fmt::format("{:.2f} m above ground", *least_m)
+                   : fmt::format("none up to {:.0f} m", kGreatestFreeHeightM);
   }
 
   std::string verdict() const {
@@ -233,9 +234,8 @@ class SightRun {
         -blocker_->clearance_m);
   }
   std::string heights_text() const {
-    return fmt::format("free from a height of the eye of {}, or of the target of {}",
-                       height_text(least_from_m_, from_.ground_m.has_value()),
-                       height_text(least_to_m_, to_.ground_m.has_value()));
+    return fmt::format("least height for a free line: of the eye {}; of the target {}",
+                       height_text(from_, least_from_m_), height_text(to_, least_to_m_));
   }
 
   std::string picture() {
@@ -249,15 +249,18 @@ class SightRun {
     drawn_.sight = sight_;
     if (blocker_)
       drawn_.blocker = {blocker_->distance_m, blocker_->map.height_m,
-                        fmt::format("{:.2f} m above the line", -blocker_->clearance_m)};
+                        fmt::format("ground {:.2f} m above the line, {:.0f} m away",
+                                    -blocker_->clearance_m, blocker_->distance_m)};
     const SurfaceNote note = note_of(*surface_);
     drawn_.title =
         fmt::format("{} \u2192 {}: {}", options_.from.text, options_.to.text, word_of(sight_));
-    drawn_.note = fmt::format("{}; surface {}, earth {}, refraction {:g}", heights_text(),
-                              note.surface, note.earth, note.refraction);
+    drawn_.notes = {heights_text(),
+                    fmt::format("surface {}, earth {}, refraction {:g}, heights {}", note.surface,
+                                note.earth, note.refraction, note.heights)};
     if (const auto i = least_ratio())
-      drawn_.note += fmt::format("; first Fresnel zone at {:g} GHz clear to {:.0f} %",
-                                 *options_.frequency_hz / 1e9, 100 * profile_[*i].fresnel_ratio());
+      drawn_.notes.back() +=
+          fmt::format("; first Fresnel zone at {:g} GHz: {:.0f} % of its radius clear",
+                      *options_.frequency_hz / 1e9, 100 * profile_[*i].fresnel_ratio());
     return draw_profile(drawn_);
   }
 
@@ -279,8 +282,7 @@ class SightRun {
                  profile_[*i].distance_m);
     if (const auto i = least_ratio())
       fmt::print(
-          "first Fresnel zone clear to {:.1f} % of its radius of {:.2f} m, {:.1f} m from "
-          "the eye\n",
+          "first Fresnel zone: {:.1f} % of its radius of {:.2f} m clear, {:.1f} m from the eye\n",
           100 * profile_[*i].fresnel_ratio(), profile_[*i].fresnel_radius_m,
           profile_[*i].distance_m);
   }

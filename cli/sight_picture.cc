@@ -11,8 +11,8 @@
 namespace scarp {
 namespace {
 
-constexpr double kWidthPx = 1200, kHeightPx = 560;
-constexpr double kLeftPx = 84, kRightPx = 1172, kTopPx = 84, kBottomPx = 476;
+constexpr double kWidthPx = 1200, kHeightPx = 600;
+constexpr double kLeftPx = 84, kRightPx = 1172, kTopPx = 132, kBottomPx = 516;
 
 constexpr char kGroundFill[] = "#cdbf9f", kGroundStroke[] = "#6f5c3b", kInk[] = "#2b2f36";
 constexpr char kFaint[] = "#dfe3e8", kSoft[] = "#69707a", kZone[] = "#3b7dd8";
@@ -75,16 +75,25 @@ class Drawing {
     end_mark(profile_.line.back(), profile_.target_foot_m, "target", false);
     blocker();
     text(kLeftPx, 34, "start", kInk, 20, profile_.title);
-    text(kLeftPx, 58, "start", kSoft, 14, profile_.note);
-    text(
-        kLeftPx, kHeightPx - 14, "start", kSoft, 12,
-        fmt::format("Heights are as they are above the datum, {:.3g} times exaggerated; the "
-                    "straight sight line bends as the Earth falls away below it.",
-                    (far_m_ / (kRightPx - kLeftPx)) / ((high_m_ - low_m_) / (kBottomPx - kTopPx))));
+    double y = 58;
+    for (const std::string& note : profile_.notes) {
+      text(kLeftPx, y, "start", kSoft, 14, note);
+      y += 20;
+    }
+    const double exaggeration =
+        (far_m_ / (kRightPx - kLeftPx)) / ((high_m_ - low_m_) / (kBottomPx - kTopPx));
+    text(kLeftPx, kHeightPx - 14, "start", kSoft, 12,
+         fmt::format("Heights are as they are above the datum, {:.3g} times exaggerated; the "
+                     "straight sight line bends as the Earth falls away below it.{}",
+                     exaggeration, has_void() ? " Gaps: ground not known." : ""));
     return svg_ + "</svg>\n";
   }
 
  private:
+  bool has_void() const {
+    return std::any_of(profile_.ground.begin(), profile_.ground.end(),
+                       [](const PictureProfile::Ground& g) { return g.void_before; });
+  }
   void include(double height_m) {
     low_m_ = std::min(low_m_, height_m);
     high_m_ = std::max(high_m_, height_m);
@@ -102,8 +111,9 @@ class Drawing {
   void text(double x, double y, const char* anchor, const char* colour, int size,
             const std::string& words) {
     svg_ += fmt::format(
-        "<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\" fill=\"{}\" font-size=\"{}\">{}"
-        "</text>\n",
+        "<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\" fill=\"{}\" font-size=\"{}\" "
+        "stroke=\"#ffffff\" "
+        "stroke-width=\"3\" paint-order=\"stroke\">{}</text>\n",
         x, y, anchor, colour, size, escaped(words));
   }
 
@@ -209,9 +219,12 @@ class Drawing {
         "<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"7\" fill=\"none\" stroke=\"{}\" "
         "stroke-width=\"2.5\"/>\n",
         x, y, colour_of(Sight::kHidden));
-    const bool right = x < (kLeftPx + kRightPx) / 2;
-    text(right ? x + 12 : x - 12, std::max(y - 12, kTopPx - 4), right ? "start" : "end",
-         colour_of(Sight::kHidden), 14, profile_.blocker->label);
+    const double label_y = kTopPx - 14;
+    svg_ += fmt::format(
+        "<path d=\"M{0:.2f} {1:.2f}V{2:.2f}\" stroke=\"{3}\" stroke-dasharray=\"2 3\"/>\n", x,
+        y - 8, label_y + 5, colour_of(Sight::kHidden));
+    const char* anchor = x < kLeftPx + 200 ? "start" : x > kRightPx - 200 ? "end" : "middle";
+    text(x, label_y, anchor, colour_of(Sight::kHidden), 14, profile_.blocker->label);
   }
 
   const PictureProfile& profile_;

@@ -27,7 +27,8 @@ struct PictureProfile {
   std::optional<double> eye_foot_m, target_foot_m;  ///< the ground under each end
   std::optional<Mark> blocker;
   Sight sight = Sight::kVisible;
-  std::string title, note;
+  std::string title;
+  std::vector<std::string> notes;  ///< up to two lines
 };
 
 /// Draws a profile as SVG. Heights are drawn as they are above the datum, so both axes read true;
