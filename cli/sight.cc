@@ -247,6 +247,7 @@ class SightRun {
     drawn_.eye_foot_m = from_.ground_m;
     drawn_.target_foot_m = to_.ground_m;
     drawn_.sight = sight_;
+    drawn_.flat_earth = !surface_->frame().earth_frame();
     if (blocker_)
       drawn_.blocker = {blocker_->distance_m, blocker_->map.height_m,
                         fmt::format("ground {:.2f} m above the line, {:.0f} m away",

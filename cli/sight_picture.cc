@@ -83,9 +83,12 @@ class Drawing {
     const double exaggeration =
         (far_m_ / (kRightPx - kLeftPx)) / ((high_m_ - low_m_) / (kBottomPx - kTopPx));
     text(kLeftPx, kHeightPx - 14, "start", kSoft, 12,
-         fmt::format("Heights are as they are above the datum, {:.3g} times exaggerated; the "
-                     "straight sight line bends as the Earth falls away below it.{}",
-                     exaggeration, has_void() ? " Gaps: ground not known." : ""));
+         fmt::format("Heights are as they are above the datum, {:.3g} times exaggerated{}.{}",
+                     exaggeration,
+                     profile_.flat_earth ? ""
+                                         : "; the straight sight line bends as the Earth falls "
+                                           "away below it",
+                     has_void() ? " Gaps: ground not known." : ""));
     return svg_ + "</svg>\n";
   }
 

@@ -27,6 +27,7 @@ struct PictureProfile {
   std::optional<double> eye_foot_m, target_foot_m;  ///< the ground under each end
   std::optional<Mark> blocker;
   Sight sight = Sight::kVisible;
+  bool flat_earth = false;
   std::string title;
   std::vector<std::string> notes;  ///< up to two lines
 };
