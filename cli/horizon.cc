@@ -37,10 +37,8 @@ std::vector<HorizonLine> horizon_of(const SightSurface& surface, const SightEnd&
   std::vector<Position> ends(count);
   for (std::size_t i = 0; i < count; ++i) {
     lines[i].azimuth_deg = 360.0 * static_cast<double>(i) / azimuths;
-    const double direction_rad = placer.plane_direction_rad(eye.map, lines[i].azimuth_deg);
-    ends[i] = round_to_lattice(Position{eye.position.x_m + reach_m * std::cos(direction_rad),
-                                        eye.position.y_m + reach_m * std::sin(direction_rad),
-                                        eye.position.z_m});
+    ends[i] =
+        ray_end(eye.position, placer.plane_direction_rad(eye.map, lines[i].azimuth_deg), reach_m);
   }
   std::vector<std::optional<RayHorizon>> found(count);
   parallel_for(count, [&](std::size_t i) {

@@ -12,6 +12,11 @@ struct RayHorizon {
   bool over_void = false;  ///< void that might rise higher lies before known ground on the ray
 };
 
+/// Where a ray from an eye ends, as a lattice position at the eye's height.
+/// @param direction_rad  in the plane, counter-clockwise from +x
+/// @param reach_m        the ray's length, unless it leaves the lattice earlier
+Position ray_end(const Position& eye, double direction_rad, double reach_m);
+
 /// The highest ground along a ray, seen from its begin: of all crossings the one with the greatest
 /// slope in the flattened frame, the farthest of equal ones. Nothing where there is no crossing.
 ///

@@ -99,8 +99,7 @@ TEST(RayHorizon, IsTheHighestOfAllTargetsOnTheRay) {
     Position eye = grid.at(12 + i % 15, 9 + i % 11);
     eye.z_m += 2;
     const double direction = turn(random);
-    const Position end = round_to_lattice(Position{eye.x_m + 3000 * std::cos(direction),
-                                                   eye.y_m + 3000 * std::sin(direction), eye.z_m});
+    const Position end = ray_end(eye, direction, 3000);
     const auto along = GridSight(grid, eye).ground_along(end);
     const auto horizon = ray_horizon(eye, end, along);
     ASSERT_TRUE(horizon);
@@ -116,6 +115,16 @@ TEST(RayHorizon, IsTheHighestOfAllTargetsOnTheRay) {
     EXPECT_NE(sight(1e-6), Sight::kHidden);
     EXPECT_EQ(sight(-1e-6), Sight::kHidden);
   }
+}
+
+TEST(RayHorizon, RaysEndWithinTheLattice) {
+  const Position eye{1.2e8, -3, 7};
+  const Position back = ray_end(eye, M_PI, 1.2e8), away = ray_end(eye, 0, 1.2e8);
+  EXPECT_NEAR(back.x_m, 0, 1);
+  EXPECT_EQ(away.x_m, kLatticeReachM);
+  EXPECT_EQ(away.y_m, -3);
+  const Position near = ray_end({5, 6, 7}, M_PI / 2, 100);
+  EXPECT_EQ(near, (Position{5, 106, 7}));
 }
 
 TEST(SightProfile, ClearanceAndFresnelZoneOfALevelLine) {
