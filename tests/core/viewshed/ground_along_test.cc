@@ -67,15 +67,15 @@ TEST(GridGroundAlong, AgreesWithTheJudgeAndWithItselfFromTheOtherEnd) {
           const Position a = random_end(grid, random), b = random_end(grid, random);
           if (a.x_m == b.x_m && a.y_m == b.y_m) continue;
           const GridSight from_a(grid, a);
-          const Sight sight = from_a.judge(b);
+          const Seen sight = from_a.judge(b);
           ASSERT_EQ(sight, sight_by_every_segment(grid, a, b));
           const GroundAlong along = from_a.ground_along(b);
-          ASSERT_EQ(any_blocks(along), sight == Sight::kHidden);
-          if (sight != Sight::kHidden) {
-            ASSERT_EQ(any_void(along), sight == Sight::kUnknown);
+          ASSERT_EQ(any_blocks(along), sight == Seen::kHidden);
+          if (sight != Seen::kHidden) {
+            ASSERT_EQ(any_void(along), sight == Seen::kUnknown);
           }
           expect_same_from_both_ends(along, GridSight(grid, b).ground_along(a));
-          ++(sight == Sight::kHidden ? hidden : sight == Sight::kUnknown ? unknown : visible);
+          ++(sight == Seen::kHidden ? hidden : sight == Seen::kUnknown ? unknown : visible);
         }
       }
     }

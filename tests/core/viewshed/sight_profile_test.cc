@@ -40,10 +40,10 @@ EarthFrame sphere(double refraction = 0) {
 }
 
 /// An eye above the middle sample and its horizon eastwards, as elevation and distance.
-struct Seen {
+struct Highest {
   double elevation_rad, distance_m;
 };
-Seen look_east(const SampleGrid& samples, const EarthFrame& earth, double eye_m) {
+Highest look_east(const SampleGrid& samples, const EarthFrame& earth, double eye_m) {
   const GroundGrid grid(samples);
   const Position eye = round_to_lattice(earth.frame.flatten({kEarthRadiusM + eye_m, 0, 0}));
   const Position end{eye.x_m + 1e6, eye.y_m, eye.z_m};
@@ -56,7 +56,7 @@ Seen look_east(const SampleGrid& samples, const EarthFrame& earth, double eye_m)
 TEST(RayHorizon, WallOfAThousandMetresAtFiveKilometres) {
   const EarthFrame earth = sphere();
   const auto wall = [](std::int32_t c, std::int32_t) { return c == 200 + 50 ? 1000.0 : 0.0; };
-  const Seen seen = look_east(on_sphere(earth, 401, 5, 100, wall), earth, 0);
+  const Highest seen = look_east(on_sphere(earth, 401, 5, 100, wall), earth, 0);
   // On the sphere: the wall's top above the eye's level plane, and along it.
   const double angle = 5000 / kEarthRadiusM, top_m = kEarthRadiusM + 1000;
   const double expected =
@@ -72,7 +72,7 @@ TEST(RayHorizon, SeaHorizonDipsAndRefractionLiftsIt) {
   for (const double eye_m : {20.0, 150.0, 400.0}) {
     for (const double k : {0.0, 0.13, 0.25}) {
       const EarthFrame earth = sphere(k);
-      const Seen seen = look_east(on_sphere(earth, 1801, 3, 100, sea), earth, eye_m);
+      const Highest seen = look_east(on_sphere(earth, 1801, 3, 100, sea), earth, eye_m);
       // The effective radius is R / (1 - k); the sea's samples err by the square of half a cell.
       const double radius_m = kEarthRadiusM / (1 - k);
       const double dip = std::sqrt(2 * eye_m * (1 - k) / kEarthRadiusM);
@@ -86,7 +86,7 @@ TEST(RayHorizon, CliffIsSeenAtItsEdge) {
   const EarthFrame earth = sphere();
   // High ground up to 600 m from the eye, then far below.
   const auto cliff = [](std::int32_t c, std::int32_t) { return c <= 106 ? 100.0 : 0.0; };
-  const Seen seen = look_east(on_sphere(earth, 201, 3, 100, cliff), earth, 102);
+  const Highest seen = look_east(on_sphere(earth, 201, 3, 100, cliff), earth, 102);
   EXPECT_NEAR(seen.distance_m, 600, 0.02);
   EXPECT_NEAR(seen.elevation_rad, -2.0 / 600, 5e-5);
 }
@@ -112,8 +112,8 @@ TEST(RayHorizon, IsTheHighestOfAllTargetsOnTheRay) {
                                                   std::hypot(end.x_m - eye.x_m, end.y_m - eye.y_m));
       return GridSight(grid, eye).judge(target);
     };
-    EXPECT_NE(sight(1e-6), Sight::kHidden);
-    EXPECT_EQ(sight(-1e-6), Sight::kHidden);
+    EXPECT_NE(sight(1e-6), Seen::kHidden);
+    EXPECT_EQ(sight(-1e-6), Seen::kHidden);
   }
 }
 
@@ -165,7 +165,7 @@ TEST(LeastFreeHeight, IsFreeThereAndNotOneStepLower) {
       if (foot.x_m == target.x_m && foot.y_m == target.y_m) continue;
       const auto is_free = [&](double height_m) {
         return GridSight(grid, {foot.x_m, foot.y_m, foot.z_m + height_m}).judge(target) !=
-               Sight::kHidden;
+               Seen::kHidden;
       };
       const auto least_m = least_free_height_m(is_free);
       if (!least_m) {
