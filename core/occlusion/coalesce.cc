@@ -115,7 +115,8 @@ class Coalescence {
   double loss_of(std::uint32_t a, std::uint32_t b) const {
     const Crystal &x = crystals_[a], &y = crystals_[b];
     const double of_x = x.triangles, of_y = y.triangles;
-    const double spread = of_x * of_y / (of_x + of_y) * squared_distance(x.place, y.place);
+    const double spread = x.place.weight * y.place.weight / (x.place.weight + y.place.weight) *
+                          squared_distance_m2(x.place, y.place);
     return (of_x + of_y) * seen_by_both(a, b) - of_x * x.seen - of_y * y.seen +
            ground_.spread_price * spread;
   }
@@ -146,9 +147,10 @@ class Coalescence {
     if (links_[a].size() < links_[b].size()) std::swap(a, b);
     Crystal &stays = crystals_[a], &goes = crystals_[b];
     for (const Crystal* c : {&stays, &goes}) small_ -= c->triangles < min_triangles_ ? 1 : 0;
-    const double of_stays = stays.triangles, of_goes = goes.triangles, of_both = of_stays + of_goes;
-    stays.place.x = (of_stays * stays.place.x + of_goes * goes.place.x) / of_both;
-    stays.place.y = (of_stays * stays.place.y + of_goes * goes.place.y) / of_both;
+    const GrowthPlace &here = stays.place, &there = goes.place;
+    const double weight = here.weight + there.weight;
+    stays.place = {(here.weight * here.x_m + there.weight * there.x_m) / weight,
+                   (here.weight * here.y_m + there.weight * there.y_m) / weight, weight};
     stays.triangles += goes.triangles;
     stays.seen = seen_by_both(a, b);
     ++stays.version;

@@ -24,8 +24,7 @@ class Exchange {
     for (TriangleIndex t = 0; t < group_of_.size(); ++t) {
       Group& group = groups_[group_of_[t]];
       ++group.triangles;
-      group.sum.x += ground.places[t].x;
-      group.sum.y += ground.places[t].y;
+      group.add(ground.places[t], 1);
       std::uint32_t* counts = counts_of(group_of_[t]);
       for_each_eye(t, [&](std::size_t eye) { ++counts[eye]; });
     }
@@ -53,9 +52,15 @@ class Exchange {
   struct Group {
     std::uint32_t triangles = 0;
     std::int64_t seen = 0;  // softened eyes that see it, in units
-    GrowthPlace sum;        // of its triangles' places
+    double x = 0, y = 0;    // sums of its triangles' places by weight
+    double weight = 0;
 
-    GrowthPlace mean() const { return {sum.x / triangles, sum.y / triangles}; }
+    void add(const GrowthPlace& place, double sign) {
+      x += sign * place.weight * place.x_m;
+      y += sign * place.weight * place.y_m;
+      weight += sign * place.weight;
+    }
+    GrowthPlace mean() const { return {x / weight, y / weight, weight}; }
   };
 
   std::uint32_t* counts_of(GroupIndex group) {
@@ -123,8 +128,9 @@ class Exchange {
     const double all = g.triangles;
     const double seen =
         all * static_cast<double>(g.seen) - (all - 1) * static_cast<double>(g.seen - seen_less);
-    return seen / kSoftUnit +
-           ground_.spread_price * all / (all - 1) * squared_distance(ground_.places[t], g.mean());
+    const GrowthPlace& place = ground_.places[t];
+    return seen / kSoftUnit + ground_.spread_price * place.weight * g.weight /
+                                  (g.weight - place.weight) * squared_distance_m2(place, g.mean());
   }
 
   double loss_added(TriangleIndex t, GroupIndex group, std::int64_t seen_more) const {
@@ -132,8 +138,9 @@ class Exchange {
     const double all = g.triangles;
     const double seen =
         (all + 1) * static_cast<double>(g.seen + seen_more) - all * static_cast<double>(g.seen);
-    return seen / kSoftUnit +
-           ground_.spread_price * all / (all + 1) * squared_distance(ground_.places[t], g.mean());
+    const GrowthPlace& place = ground_.places[t];
+    return seen / kSoftUnit + ground_.spread_price * place.weight * g.weight /
+                                  (g.weight + place.weight) * squared_distance_m2(place, g.mean());
   }
 
   void move(TriangleIndex t, GroupIndex from, GroupIndex to) {
@@ -144,10 +151,8 @@ class Exchange {
     });
     --groups_[from].triangles;
     ++groups_[to].triangles;
-    groups_[from].sum.x -= ground_.places[t].x;
-    groups_[from].sum.y -= ground_.places[t].y;
-    groups_[to].sum.x += ground_.places[t].x;
-    groups_[to].sum.y += ground_.places[t].y;
+    groups_[from].add(ground_.places[t], -1);
+    groups_[to].add(ground_.places[t], 1);
     group_of_[t] = to;
   }
 

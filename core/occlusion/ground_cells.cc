@@ -62,11 +62,14 @@ class Rings {
     seen_above_m_[ground_.at(column_, row_)] = kVoidHeightM;
     const std::int32_t last =
         std::max({column_, row_, ground_.columns - 1 - column_, ground_.rows - 1 - row_});
-    for (ring_ = 1; ring_ <= last; ++ring_)
+    for (ring_ = 1; ring_ <= last; ++ring_) {
+      nearer_ = static_cast<float>(ring_ - 1) / static_cast<float>(ring_);
+      farther_ = ring_ == 1 ? 0 : static_cast<float>(ring_) / static_cast<float>(ring_ - 1);
       for (const std::int32_t side : {-ring_, ring_}) {
         draw_row(side);
         draw_column(side);
       }
+    }
   }
 
  private:
@@ -100,8 +103,7 @@ class Rings {
     float share;  // of the second
   };
   Crossing crossing_of(std::int32_t eye_at, std::int32_t offset) const {
-    const float crossed = static_cast<float>(std::abs(offset)) * static_cast<float>(ring_ - 1) /
-                          static_cast<float>(ring_);
+    const float crossed = static_cast<float>(std::abs(offset)) * nearer_;
     const auto whole = static_cast<std::int32_t>(crossed);
     const float share = crossed - static_cast<float>(whole);
     const std::int32_t beyond = share > 0 ? whole + 1 : whole;
@@ -115,9 +117,8 @@ class Rings {
       seen_above_m_[node] = height_m;
       return;
     }
-    const float farther = static_cast<float>(ring_) / static_cast<float>(ring_ - 1);
     const float line_m =
-        ((1 - share) * seen_above_m_[first] + share * seen_above_m_[second]) * farther;
+        ((1 - share) * seen_above_m_[first] + share * seen_above_m_[second]) * farther_;
     seen_above_m_[node] = std::max({line_m, height_m, kVoidHeightM});
   }
 
@@ -126,6 +127,7 @@ class Rings {
   float eye_z_m_;
   std::int32_t column_, row_;
   std::int32_t ring_ = 0;
+  float nearer_ = 0, farther_ = 0;  // from this ring to the one before, and back
 };
 
 }  // namespace

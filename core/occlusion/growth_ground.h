@@ -10,21 +10,23 @@
 
 namespace scarp {
 
-/// A place in the plane, in widths of a typical group: the square root of the plan area for each
-/// group asked for.
+/// A place in the plane, metres, and how much being far from it weighs, for each square metre: one
+/// over the plan area that a group of the size asked for would have where triangles are like this.
+/// For several triangles their mean place, by weight, and the sum of their weights.
 struct GrowthPlace {
-  double x = 0;
-  double y = 0;
+  double x_m = 0;
+  double y_m = 0;
+  double weight = 0;
 };
 
-inline double squared_distance(const GrowthPlace& a, const GrowthPlace& b) {
-  return (a.x - b.x) * (a.x - b.x) + (a.y - b.y) * (a.y - b.y);
+inline double squared_distance_m2(const GrowthPlace& a, const GrowthPlace& b) {
+  return (a.x_m - b.x_m) * (a.x_m - b.x_m) + (a.y_m - b.y_m) * (a.y_m - b.y_m);
 }
 
 /// What growth by being hidden together knows of a surface.
 ///
 /// The loss of a partition is the sum, over its groups, of triangles * eyes that see any of them,
-/// plus spread_price * squared distance to the group's mean place, over its triangles.
+/// plus spread_price * weight * squared distance to the group's mean place, over its triangles.
 struct GrowthGround {
   SeenSample seen;
   std::vector<GrowthPlace> places;             ///< [triangles] centroids

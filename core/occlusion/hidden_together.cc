@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
-#include <cmath>
 #include <utility>
+#include <vector>
 
 #include "core/occlusion/growth_ground.h"
 #include "core/occlusion/void_bridges.h"
@@ -14,6 +14,9 @@ namespace {
 
 /// From soft to hard, so that groups first find their valleys and then settle.
 constexpr std::array<ExchangeRound, 5> kRounds = {{{6, 3}, {4, 3}, {2, 3}, {1, 3}, {0, 6}}};
+
+/// Rounds in which areas are smoothed: over about as many triangles as a small group has.
+constexpr int kAreaRounds = 8;
 
 /// Shares of the time after sampling and after coalescing: progress only.
 constexpr double kSampled = 0.5, kCoalesced = 0.7;
@@ -40,20 +43,35 @@ void connect(const Tin& tin, std::uint32_t group_triangles, GrowthGround& ground
   }
 }
 
-void measure(const Tin& tin, std::uint32_t groups, GrowthGround& ground) {
-  const Bounds bounds = bounds_of(tin.vertices);
-  double twice_m2 = 0;
+/// Plan areas, each the mean of its surroundings: needles beside large triangles even out.
+std::vector<double> typical_areas_m2(const Tin& tin, const GrowthGround& ground) {
+  std::vector<double> areas_m2, means_m2(tin.triangles.size());
+  areas_m2.reserve(tin.triangles.size());
   for (const auto& [a, b, c] : tin.triangles) {
     const Position &p = tin.vertices[a], &q = tin.vertices[b], &r = tin.vertices[c];
-    twice_m2 += (q.x_m - p.x_m) * (r.y_m - p.y_m) - (q.y_m - p.y_m) * (r.x_m - p.x_m);
+    areas_m2.push_back(((q.x_m - p.x_m) * (r.y_m - p.y_m) - (q.y_m - p.y_m) * (r.x_m - p.x_m)) / 2);
   }
-  const double width_m = std::sqrt(twice_m2 / 2 / groups);
+  for (int i = 0; i < kAreaRounds; ++i) {
+    for (TriangleIndex t = 0; t < areas_m2.size(); ++t) {
+      const auto neighbours = ground.neighbours_of(t);
+      means_m2[t] = areas_m2[t];
+      for (const TriangleIndex n : neighbours) means_m2[t] += areas_m2[n];
+      means_m2[t] /= static_cast<double>(neighbours.size() + 1);
+    }
+    std::swap(areas_m2, means_m2);
+  }
+  return areas_m2;
+}
+
+void measure(const Tin& tin, std::uint32_t group_triangles, GrowthGround& ground) {
+  const Position low = bounds_of(tin.vertices).low;
+  const std::vector<double> areas_m2 = typical_areas_m2(tin, ground);
   ground.places.reserve(tin.triangles.size());
-  for (const auto& corners : tin.triangles) {
-    GrowthPlace place;
-    for (const VertexIndex v : corners) {
-      place.x += (tin.vertices[v].x_m - bounds.low.x_m) / (3 * width_m);
-      place.y += (tin.vertices[v].y_m - bounds.low.y_m) / (3 * width_m);
+  for (TriangleIndex t = 0; t < tin.triangles.size(); ++t) {
+    GrowthPlace place{0, 0, 1 / (group_triangles * areas_m2[t])};
+    for (const VertexIndex v : tin.triangles[t]) {
+      place.x_m += (tin.vertices[v].x_m - low.x_m) / 3;
+      place.y_m += (tin.vertices[v].y_m - low.y_m) / 3;
     }
     ground.places.push_back(place);
   }
@@ -90,7 +108,7 @@ LeafGroups grow_hidden_together(const Tin& tin, const HiddenTogetherOptions& opt
   if (progress) progress(kSampled);
   ground.spread_price = options.compactness * options.eyes;
   connect(tin, options.group_triangles, ground);
-  measure(tin, groups, ground);
+  measure(tin, options.group_triangles, ground);
   const std::uint32_t least = std::min(options.min_group_triangles, options.group_triangles);
   Partition partition = coalesce(ground, groups, least);
   if (progress) progress(kCoalesced);

@@ -13,8 +13,8 @@ struct HiddenTogetherOptions {
   std::uint32_t group_triangles = 128;     ///< mean size that is asked for
   std::uint32_t min_group_triangles = 30;  ///< what is worth drawing at once
   std::uint32_t eyes = 512;                ///< sampled; a multiple of 64
-  /// Worth of being compact: a group of a typical group's plan area that is round rather than
-  /// long is worth about compactness / 16 of its triangles' chances to be culled.
+  /// Price of reaching far. In a disc of the plan area that is usual for a group there, distance
+  /// costs a triangle as much as being seen from compactness / (2 pi) of the eyes.
   double compactness = 0.08;
 };
 

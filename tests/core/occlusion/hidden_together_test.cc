@@ -329,7 +329,7 @@ GrowthGround strip(const std::vector<std::uint64_t>& bits) {
   ground.seen = {64, 1, bits};
   ground.first_neighbour.push_back(0);
   for (TriangleIndex t = 0; t < bits.size(); ++t) {
-    ground.places.push_back({static_cast<double>(t), 0});
+    ground.places.push_back({static_cast<double>(t), 0, 1});
     if (t > 0) ground.neighbours.push_back(t - 1);
     if (t + 1 < bits.size()) ground.neighbours.push_back(t + 1);
     ground.first_neighbour.push_back(static_cast<std::uint32_t>(ground.neighbours.size()));
