@@ -376,6 +376,23 @@ TEST(Exchange, SoftenedLossLeadsOverWhatPaysOnlyTogether) {
   EXPECT_LT(loss_of(ground, freed), loss_of(ground, stuck));
 }
 
+TEST(Exchange, DistanceAloneMakesEqualHalvesAndFollowsTheWeights) {
+  GrowthGround ground = strip(std::vector<std::uint64_t>(12, 0));
+  ground.spread_price = 1;
+  const ExchangeRound hard{0, 9};
+  Partition partition{{0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1}, 2};
+  exchange(ground, {&hard, 1}, 1, partition);
+  const auto first = std::count(partition.group_of_triangle.begin(),
+                                partition.group_of_triangle.end(), GroupIndex{0});
+  EXPECT_NEAR(static_cast<double>(first), 6, 1);
+  // Where distance weighs little, triangles may be far: the other half is the smaller one.
+  for (TriangleIndex t = 0; t < 6; ++t) ground.places[t].weight = 1.0 / 64;
+  exchange(ground, {&hard, 1}, 1, partition);
+  EXPECT_GT(std::count(partition.group_of_triangle.begin(), partition.group_of_triangle.end(),
+                       GroupIndex{0}),
+            first);
+}
+
 RC_GTEST_PROP(Exchange, NeverLosesAndKeepsGroupsWhole, ()) {
   const auto bits = *rc::gen::container<std::vector<std::uint64_t>>(
       40, rc::gen::map(rc::gen::inRange<std::uint64_t>(0, 64),
