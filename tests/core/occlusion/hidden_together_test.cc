@@ -318,7 +318,7 @@ TEST(SeenSample, AgreesWithTheJudgeButForFew) {
     }
   }
   const double all = kEyes * static_cast<double>(rolling().triangles.size());
-  EXPECT_LT(static_cast<double>(wrong) / all, 0.03);
+  EXPECT_LT(static_cast<double>(wrong) / all, 0.01);
   EXPECT_GT(static_cast<double>(seen) / all, 0.2);
   EXPECT_LT(static_cast<double>(seen) / all, 0.8);
 }
