@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "core/culling/certified_culling.h"
 #include "core/culling/visible_groups.h"
 #include "core/horizon/stewart.h"
 #include "core/occlusion/certified/hiding_bounds.h"
@@ -70,24 +71,23 @@ struct Settings {
   std::uint32_t group_triangles = 128;
   std::uint64_t seed = 1;
   bool thesis = false;
+  double bytes = 16;
 };
 
 struct Counts {
   double triangles = 0, hidden = 0, in_hidden = 0, culled = 0, falsely = 0;
 };
 
+/// What the bounds hide before they are compressed.
 bool fine_culls(const HidingBounds& bounds, GroupIndex g, const Position& eye) {
   const Circle& c = bounds.circle[g];
   const double dx = eye.x_m - c.x_m, dy = eye.y_m - c.y_m;
-  const double distance = std::hypot(dx, dy);
-  if (distance < bounds.ratio[0] * c.radius_m) return false;
-  const auto ring = std::upper_bound(bounds.ratio.begin(), bounds.ratio.end(), distance / c.radius_m) -
-                    bounds.ratio.begin() - 1;
-  double azimuth = std::atan2(dy, dx);
-  if (azimuth < 0) azimuth += 2 * std::numbers::pi;
-  const auto sector = std::min(bounds.sectors - 1, static_cast<std::int32_t>(azimuth * bounds.sectors / (2 * std::numbers::pi)));
-  const double slope = bounds.at(g, sector)[static_cast<std::size_t>(ring)];
-  return eye.z_m < bounds.height_m[g] + slope * distance;
+  const double distance_m = std::hypot(dx, dy);
+  const double ratio = distance_m / (c.radius_m * kFirstRing);
+  if (!(ratio >= 1)) return false;
+  const std::int32_t ring = ring_of(bounds.layout, static_cast<float>(ratio * ratio));
+  const double slope = static_cast<double>(bounds.at(g, sector_of(bounds.layout, dx, dy))[static_cast<std::size_t>(ring)]);
+  return eye.z_m < bounds.height_m[g] + slope * distance_m;
 }
 
 std::vector<std::uint8_t> fine_culled(const HidingBounds& bounds, std::span<const GroupIndex> group_of,
@@ -140,15 +140,24 @@ void run_dem(const NamedDem& dem, const Settings& settings) {
   const Tin tin = mesh_samples(grid, mesh_options, {}).tin;
   const LeafGroups leaves = group_by_squares(tin, settings.group_triangles);
   double start = user_seconds();
-  const HidingBounds bounds = bound_hiding(tin, leaves.group_of_triangle, leaves.count, settings.hiding);
+  HidingOptions hiding = settings.hiding;
+  if (settings.bytes > 0) hiding.sectors = sectors_within(settings.bytes, tin.triangles.size(), leaves.count);
+  const HidingBounds bounds = bound_hiding(tin, leaves.group_of_triangle, leaves.count, hiding);
   const double bound_s = user_seconds() - start;
-  fmt::print("{}: {} triangles, {} groups; bounds {:.1f} s = {:.0f} us a triangle\n", dem.name,
-             tin.triangles.size(), leaves.count, bound_s, 1e6 * bound_s / static_cast<double>(tin.triangles.size()));
+  start = user_seconds();
+  const CertifiedRegions regions = compress_bounds(bounds, bounds_of(tin.vertices));
+  const double compress_s = user_seconds() - start;
+  if (const auto broken = check_certified(regions)) fmt::print("BROKEN: {}\n", *broken);
+  CertifiedCulling certified(regions);
+  fmt::print("{}: {} triangles, {} groups; bounds {:.1f} s = {:.0f} us a triangle, compression {:.0f} us; {} sectors, {:.1f} bytes a triangle\n", dem.name,
+             tin.triangles.size(), leaves.count, bound_s, 1e6 * bound_s / static_cast<double>(tin.triangles.size()),
+             1e6 * compress_s / static_cast<double>(tin.triangles.size()), regions.layout.sectors,
+             static_cast<double>(regions.groups.size() * sizeof(CertifiedGroup) + regions.steps.size() * sizeof(SectorSteps)) / static_cast<double>(tin.triangles.size()));
   std::optional<Groups> thesis;
   if (settings.thesis)
     thesis = build_group_tree(tin, stewart_horizons(tin.vertices, {}, {}), leaves);
   const TinIndex index(tin);
-  std::array<Counts, 4> fine, thesis_counts;
+  std::array<Counts, 4> fine, certified_counts, thesis_counts;
   for (std::size_t h = 0; h < 4; ++h) {
     SplitMix64 random(settings.seed);
     for (int i = 0; i < settings.eyes; ++i) {
@@ -157,12 +166,18 @@ void run_dem(const NamedDem& dem, const Settings& settings) {
       const std::vector<TriangleSight> sight = judge_all(index, eye);
       count(fine[h], leaves.group_of_triangle, leaves.count, sight,
             fine_culled(bounds, leaves.group_of_triangle, eye));
+      Groups grouped;
+      grouped.group_of_triangle = leaves.group_of_triangle;
+      grouped.leaf_count = leaves.count;
+      count(certified_counts[h], leaves.group_of_triangle, leaves.count, sight,
+            culled_triangles(grouped, certified.visible({eye, {}})));
       if (thesis)
         count(thesis_counts[h], leaves.group_of_triangle, leaves.count, sight,
               culled_triangles(*thesis, visible_groups(*thesis, {eye, {}})));
     }
   }
   print_rows("fine", fine);
+  print_rows("certified", certified_counts);
   if (thesis) print_rows("thesis", thesis_counts);
 }
 
@@ -197,6 +212,7 @@ int main(int argc, char** argv) {
     if (name == "--vertices") settings.vertices = static_cast<std::uint32_t>(std::stoul(value));
     else if (name == "--eyes") settings.eyes = std::stoi(value);
     else if (name == "--dem") settings.dem = value;
+    else if (name == "--bytes") settings.bytes = std::stod(value);
     else if (name == "--fans") settings.hiding.fans = std::stoi(value);
     else if (name == "--sectors") settings.hiding.sectors = std::stoi(value);
     else if (name == "--spacing") settings.hiding.spacing = std::stod(value);

@@ -5,7 +5,6 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <numeric>
 #include <utility>
 
@@ -28,7 +27,6 @@ constexpr float kSlopeRounding = 0x1p-19F;
 
 constexpr float kNothing = -std::numeric_limits<float>::infinity();
 constexpr float kEverything = std::numeric_limits<float>::infinity();
-constexpr double kPi = std::numbers::pi;
 
 using RingRow = std::array<float, kRings>;
 const RingRow kNothingYet = [] {
@@ -42,20 +40,18 @@ constexpr int kMostHalvings = 6;
 
 /// Rings and lanes in units of a group's radius: the same for every group.
 struct RingTable {
-  std::vector<double> ratio;                      // [kRings]
-  RingRow near_inverse{}, far_inverse{};          // of distances
-  std::array<RingRow, kLanes> forward{};          // least u of a camera by its distance
+  RingRow near_inverse{}, far_inverse{};                   // of distances
+  std::array<RingRow, kLanes> forward{};                   // least u of a camera by its distance
   std::array<std::array<double, kRings>, kLanes> reach{};  // least u of a camera
   std::array<std::array<double, kRings>, kLanes> turn_low{}, turn_high{};  // camera azimuth - ray's
 
-  RingTable(double greatest_ratio, const Fan& fan) {
-    const double first = 1 + 0x1p-10;
-    const double step = std::pow(std::max(greatest_ratio, 2.0) / first, 1.0 / (kRings - 1));
-    for (std::int32_t k = 0; k < kRings; ++k) ratio.push_back(first * std::pow(step, k));
+  RingTable(const PolarLayout& layout, const Fan& fan) {
     for (std::size_t k = 0; k < kRings; ++k) {
-      const bool is_last = k + 1 == kRings;
-      const double near = ratio[k] * (1 - kDistanceOverlap);
-      const double far = is_last ? HUGE_VAL : ratio[k + 1] * (1 + kDistanceOverlap);
+      const auto ring = static_cast<std::int32_t>(k);
+      const double near = ring_start(layout, ring) * kFirstRing * (1 - kCellOverlap);
+      const double far = ring + 1 == kRings
+                             ? HUGE_VAL
+                             : ring_start(layout, ring + 1) * kFirstRing * (1 + kCellOverlap);
       near_inverse[k] = static_cast<float>(1 / near);
       far_inverse[k] = static_cast<float>(1 / far);
       for (std::size_t lane = 0; lane < kLanes; ++lane) {
@@ -67,9 +63,9 @@ struct RingTable {
         reach[lane][k] = least * (1 - 0x1p-40);
         forward[lane][k] = static_cast<float>(least / near);
         turn_low[lane][k] = std::asin(low / (low < 0 ? near : far)) - fan.half_rad -
-                            kAzimuthOverlapRad;
+                            kCellOverlap;
         turn_high[lane][k] = std::asin(high / (high > 0 ? near : far)) + fan.half_rad +
-                             kAzimuthOverlapRad;
+                             kCellOverlap;
       }
     }
   }
@@ -124,7 +120,6 @@ class Bounding {
     const double depth_m = bounds.high.y_m - bounds.low.y_m;
     origin_x_m_ = round_to_lattice(bounds.low.x_m + width_m / 2);
     origin_y_m_ = round_to_lattice(bounds.low.y_m + depth_m / 2);
-    lowest_m_ = bounds.low.z_m;
     double area_m2 = 0, radius_m = 0;
     for (const auto& [a, b, c] : tin.triangles) {
       const Position &p = tin.vertices[a], &q = tin.vertices[b], &r = tin.vertices[c];
@@ -132,20 +127,22 @@ class Bounding {
     }
     for (const Circle& circle : bounds_.circle) radius_m += circle.radius_m / groups;
     unit_m_ = std::sqrt(2 * area_m2 / static_cast<double>(tin.triangles.size()));
-    greatest_ratio_ = std::hypot(width_m, depth_m) / radius_m;
     for (TriangleIndex t = 0; t < tin.triangles.size(); ++t)
       for (std::size_t i = 0; i < 3; ++i)
         if (tin.neighbours[t][i] == kNone)
           borders_.emplace_back(tin.triangles[t][(i + 1) % 3], tin.triangles[t][(i + 2) % 3]);
-    bounds_.sectors = options.sectors;
+    bounds_.lowest_m = bounds.low.z_m;
+    bounds_.highest_m = bounds.high.z_m;
+    // The finer rings where they reach over the whole surface.
+    const double reach = std::hypot(width_m, depth_m) / radius_m;
+    bounds_.layout = {options.sectors, reach < ring_start({8, 3}, kRings - 1) ? 3 : 2};
     bounds_.slope.assign(static_cast<std::size_t>(groups) *
                              static_cast<std::size_t>(options.sectors) * kRings,
                          kEverything);
   }
 
   HidingBounds run(const Progress& progress) {
-    const RingTable rings(greatest_ratio_, fan_of(options_.fans, 0));
-    bounds_.ratio = rings.ratio;
+    const RingTable rings(bounds_.layout, fan_of(options_.fans, 0));
     std::array<FanView, kFansAtOnce> views;
     std::array<Curtains, kFansAtOnce> curtains;
     std::array<Turns, kFansAtOnce> turns;
@@ -200,16 +197,16 @@ class Bounding {
 
   Turns turns_of(const Fan& fan, const RingTable& rings) const {
     const std::int32_t sectors = options_.sectors;
-    const double scale = sectors / (2 * kPi);
+    const auto sector_at = [&](double azimuth_rad) {
+      return sector_of(bounds_.layout, std::cos(azimuth_rad), std::sin(azimuth_rad));
+    };
     Turns turns{};
     for (std::size_t lane = 0; lane < kLanes; ++lane)
       for (std::size_t k = 0; k < kRings; ++k) {
-        const auto from = static_cast<std::int32_t>(
-            std::floor((fan.middle_rad + rings.turn_low[lane][k]) * scale));
-        const auto to = static_cast<std::int32_t>(
-            std::floor((fan.middle_rad + rings.turn_high[lane][k]) * scale));
-        turns.first[lane][k] = (from + sectors) % sectors;
-        turns.count[lane][k] = std::min(to - from + 1, sectors);
+        const std::int32_t from = sector_at(fan.middle_rad + rings.turn_low[lane][k]);
+        const std::int32_t to = sector_at(fan.middle_rad + rings.turn_high[lane][k]);
+        turns.first[lane][k] = from;
+        turns.count[lane][k] = (to - from + sectors) % sectors + 1;
       }
     return turns;
   }
@@ -236,7 +233,7 @@ class Bounding {
         place_in(view.fan, circle.x_m - origin_x_m_, circle.y_m - origin_y_m_, look.height_m);
     for (std::size_t k = 0; k < kRings; ++k)
       look.floor[k] =
-          static_cast<float>((lowest_m_ - look.height_m) / (rings.ratio[k] * look.radius_m));
+          static_cast<float>((bounds_.lowest_m - look.height_m) / (look.radius_m / rings.near_inverse[k]));
     const std::size_t first = parts_.first[group];
     for (std::size_t i = first; i < parts_.first[group + 1]; ++i) {
       const bool lowered = look_from_triangle(look, parts_.triangles[i]);
@@ -402,8 +399,6 @@ class Bounding {
   std::vector<std::pair<VertexIndex, VertexIndex>> borders_;
   double origin_x_m_ = 0, origin_y_m_ = 0;
   double unit_m_ = 0;
-  double lowest_m_ = 0;
-  double greatest_ratio_ = 0;
 };
 
 }  // namespace

@@ -1,0 +1,275 @@
+#include "core/occlusion/certified/certified_regions.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+
+#include "core/threads/parallel_for.h"
+
+namespace scarp {
+namespace {
+
+constexpr std::size_t kSteps = std::tuple_size_v<SectorSteps>;
+
+/// Bounds far above all ground say no more than those that reach this far above it.
+constexpr double kHeadroomM = 2000;
+
+/// A run of rings that share one slope, and what is lost by that.
+struct Run {
+  std::int32_t first;
+  double least;           // slope
+  double weight, wanted;  // sums over rings: of weights, and of weight * height
+  double cost;            // what the run loses: weighted height under the bounds of its rings
+};
+
+/// Heights that bounds reach, as far as cameras can be there.
+class Room {
+ public:
+  Room(const HidingBounds& bounds, const Bounds& ground, GroupIndex group)
+      : ground_(ground), circle_(bounds.circle[group]), height_m_(bounds.height_m[group]) {
+    for (std::int32_t k = 0; k < kRings; ++k)
+      start_m_.push_back(ring_start(bounds.layout, k) * kFirstRing * circle_.radius_m);
+    start_m_.push_back(2 * start_m_.back());
+    low_m_ = bounds.lowest_m;
+    high_m_ = bounds.highest_m + kHeadroomM;
+  }
+
+  double slope_for(double z_m, std::int32_t ring) const {
+    return (z_m - height_m_) / start_m_[static_cast<std::size_t>(ring)];
+  }
+  /// Below this, a bound is under all ground; the group's height is not.
+  double low_slope(std::int32_t ring) const { return slope_for(low_m_, ring); }
+  double high_slope(std::int32_t ring) const { return slope_for(high_m_, ring); }
+
+  /// Height over the middle of a ring, as far above the lowest ground as cameras can be.
+  double room_m(double slope, std::int32_t ring) const {
+    const double distance_m = middle_m(ring);
+    return std::clamp(height_m_ + slope * distance_m, low_m_, high_m_) - low_m_;
+  }
+
+  /// How many cameras are in a ring of a sector: its area, if that is over the surface.
+  double weight(std::int32_t ring, double direction_x, double direction_y) const {
+    const double distance_m = middle_m(ring);
+    const double x_m = circle_.x_m + direction_x * distance_m;
+    const double y_m = circle_.y_m + direction_y * distance_m;
+    const bool over = x_m >= ground_.low.x_m && x_m <= ground_.high.x_m &&
+                      y_m >= ground_.low.y_m && y_m <= ground_.high.y_m;
+    const double share = over ? 1 : kOutsideWeight;
+    return share * distance_m *
+           (start_m_[static_cast<std::size_t>(ring) + 1] - start_m_[static_cast<std::size_t>(ring)]) /
+           (start_m_[0] * start_m_[0]);
+  }
+
+ private:
+  /// Cameras outside the data count little, but they count.
+  static constexpr double kOutsideWeight = 1e-4;
+
+  double middle_m(std::int32_t ring) const {
+    const auto k = static_cast<std::size_t>(ring);
+    return (start_m_[k] + start_m_[k + 1]) / 2;
+  }
+
+  Bounds ground_;
+  Circle circle_;
+  double height_m_, low_m_, high_m_;
+  std::vector<double> start_m_;  // [kRings + 1]
+};
+
+/// Joins neighbouring runs until kSteps are left, cheapest first.
+class Joining {
+ public:
+  Joining(const Room& room, std::span<const float> slopes, std::span<const double> weights)
+      : room_(room), weights_(weights) {
+    for (std::int32_t k = 0; k < kRings; ++k) {
+      const double slope = static_cast<double>(slopes[static_cast<std::size_t>(k)]);
+      const double useful = slope < room.low_slope(k) ? -HUGE_VAL : std::min(slope, room.high_slope(k));
+      const double weight = weights[static_cast<std::size_t>(k)];
+      const double height_m = useful > -HUGE_VAL ? room.room_m(useful, k) : 0;
+      Run run{k, useful, weight, weight * height_m, 0};
+      if (!runs_.empty() && runs_.back().least == useful && useful == -HUGE_VAL) {
+        runs_.back().weight += weight;
+        continue;
+      }
+      runs_.push_back(run);
+    }
+  }
+
+  const std::vector<Run>& join() {
+    std::vector<double> price;
+    for (std::size_t i = 0; i + 1 < runs_.size(); ++i) price.push_back(price_of(i));
+    while (runs_.size() > kSteps) {
+      const auto i = static_cast<std::size_t>(std::min_element(price.begin(), price.end()) - price.begin());
+      runs_[i] = joined(i);
+      runs_.erase(runs_.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+      price.erase(price.begin() + static_cast<std::ptrdiff_t>(i));
+      if (i < price.size()) price[i] = price_of(i);
+      if (i > 0) price[i - 1] = price_of(i - 1);
+    }
+    return runs_;
+  }
+
+ private:
+  std::int32_t end_of(std::size_t i) const {
+    return i + 1 < runs_.size() ? runs_[i + 1].first : kRings;
+  }
+  Run joined(std::size_t i) const {
+    Run run{runs_[i].first, std::min(runs_[i].least, runs_[i + 1].least), 0,
+            runs_[i].wanted + runs_[i + 1].wanted, 0};
+    double kept = 0;
+    if (run.least > -HUGE_VAL)
+      for (std::int32_t k = run.first; k < end_of(i + 1); ++k)
+        kept += weights_[static_cast<std::size_t>(k)] * room_.room_m(run.least, k);
+    run.cost = run.wanted - kept;
+    return run;
+  }
+  double price_of(std::size_t i) const {
+    return joined(i).cost - runs_[i].cost - runs_[i + 1].cost;
+  }
+
+  const Room& room_;
+  std::span<const double> weights_;
+  std::vector<Run> runs_;
+};
+
+struct Axis {
+  double x, y;
+};
+
+/// Middle directions of the sectors.
+std::vector<Axis> directions_of(const PolarLayout& layout) {
+  // Inverse of the sectors' definition: s (1.273 - 0.273 s) = f.
+  std::vector<Axis> axes;
+  for (std::int32_t sector = 0; sector < layout.sectors; ++sector) {
+    const double eighths = (sector + 0.5) * 8 / layout.sectors;
+    const int eighth = static_cast<int>(eighths);
+    const double part = eighths - eighth;
+    const double f = eighth % 2 == 0 ? part : 1 - part;
+    const double s = (1.273 - std::sqrt(1.273 * 1.273 - 4 * 0.273 * f)) / (2 * 0.273);
+    const double azimuth_rad =
+        M_PI / 4 * (eighth % 2 == 0 ? eighth : eighth + 1) + (eighth % 2 == 0 ? 1 : -1) * std::atan(s);
+    axes.push_back({std::cos(azimuth_rad), std::sin(azimuth_rad)});
+  }
+  return axes;
+}
+
+float round_up(double value) {
+  const auto nearest = static_cast<float>(value);
+  return static_cast<double>(nearest) >= value
+             ? nearest
+             : std::nextafter(nearest, std::numeric_limits<float>::infinity());
+}
+
+std::uint16_t slope_code(const CertifiedGroup& group, double slope) {
+  const auto low = static_cast<double>(group.low_slope);
+  if (!(slope >= low)) return 0;
+  const auto step = static_cast<double>(group.slope_step);
+  double code = step > 0 ? std::min(std::floor((slope - low) / step) + 1, kSlopeCodes - 1.0) : 1;
+  while (code > 0 && static_cast<double>(slope_of(group, static_cast<std::int32_t>(code))) > slope)
+    --code;
+  return static_cast<std::uint16_t>(code);
+}
+
+void compress_group(const HidingBounds& bounds, const Bounds& ground,
+                    const std::vector<Axis>& directions, GroupIndex g, CertifiedRegions& regions) {
+  const auto sectors = static_cast<std::size_t>(regions.layout.sectors);
+  const Room room(bounds, ground, g);
+  std::vector<std::vector<Run>> runs(sectors);
+  double low = HUGE_VAL, high = -HUGE_VAL;
+  std::vector<double> weights(kRings);
+  for (std::size_t s = 0; s < sectors; ++s) {
+    for (std::int32_t k = 0; k < kRings; ++k)
+      weights[static_cast<std::size_t>(k)] = room.weight(k, directions[s].x, directions[s].y);
+    runs[s] = Joining(room, bounds.at(g, static_cast<std::int32_t>(s)), weights).join();
+    for (const Run& run : runs[s]) {
+      if (run.least == -HUGE_VAL) continue;
+      low = std::min(low, run.least);
+      high = std::max(high, run.least);
+    }
+  }
+  CertifiedGroup& group = regions.groups[g];
+  const Circle& circle = bounds.circle[g];
+  group.centre_x_m = circle.x_m;
+  group.centre_y_m = circle.y_m;
+  group.height_m = bounds.height_m[g];
+  group.radius_m = round_up(circle.radius_m * kFirstRing);
+  if (low > high) low = high = 0;
+  group.low_slope = -round_up(-low);
+  group.slope_step = round_up((high - static_cast<double>(group.low_slope)) / (kSlopeCodes - 2));
+  for (std::size_t s = 0; s < sectors; ++s) {
+    SectorSteps& steps = regions.steps[g * sectors + s];
+    for (std::size_t i = 0; i < kSteps; ++i) {
+      // What is left over repeats the last step.
+      const Run& run = runs[s][std::min(i, runs[s].size() - 1)];
+      steps[i] = static_cast<std::uint16_t>(run.first << kSlopeBits | slope_code(group, run.least));
+    }
+  }
+}
+
+}  // namespace
+
+CertifiedRegions compress_bounds(const HidingBounds& bounds, const Bounds& ground) {
+  CertifiedRegions regions;
+  regions.layout = bounds.layout;
+  regions.groups.resize(bounds.circle.size());
+  regions.steps.resize(bounds.circle.size() * static_cast<std::size_t>(bounds.layout.sectors));
+  const std::vector<Axis> directions = directions_of(bounds.layout);
+  parallel_for(bounds.circle.size(), [&](std::size_t g) {
+    compress_group(bounds, ground, directions, static_cast<GroupIndex>(g), regions);
+  });
+  return regions;
+}
+
+CertifiedRegions certify_groups(const Tin& tin, std::span<const GroupIndex> group_of_triangle,
+                                std::uint32_t groups, const HidingOptions& options,
+                                const Progress& progress) {
+  if (groups == 0) return {{options.sectors, 2}, {}, {}};
+  return compress_bounds(bound_hiding(tin, group_of_triangle, groups, options, progress),
+                         bounds_of(tin.vertices));
+}
+
+bool hides_group(const CertifiedRegions& regions, GroupIndex group, const Position& eye) {
+  assert(group < regions.groups.size());
+  const CertifiedGroup& g = regions.groups[group];
+  const auto x_m = static_cast<float>(eye.x_m - g.centre_x_m);
+  const auto y_m = static_cast<float>(eye.y_m - g.centre_y_m);
+  const float square_m2 = x_m * x_m + y_m * y_m;
+  const float ring_square = square_m2 / (g.radius_m * g.radius_m);
+  if (!(ring_square >= 1)) return false;
+  return hides_at(g, regions.at(group, sector_of(regions.layout, x_m, y_m)),
+                  ring_of(regions.layout, ring_square), std::sqrt(square_m2),
+                  static_cast<float>(eye.z_m - g.height_m));
+}
+
+std::int32_t sectors_within(double bytes, std::size_t triangles, std::uint32_t groups) {
+  const double each = bytes * static_cast<double>(triangles) / std::max(1U, groups);
+  const double room = each - static_cast<double>(sizeof(CertifiedGroup));
+  const double eighths = std::floor(room / (8 * sizeof(SectorSteps)));
+  return 8 * static_cast<std::int32_t>(std::clamp(eighths, 1.0, 512.0));
+}
+
+std::optional<std::string> check_certified(const CertifiedRegions& regions) {
+  const PolarLayout& layout = regions.layout;
+  if (layout.sectors < 8 || layout.sectors > 4096 || layout.sectors % 8 != 0)
+    return "sectors are not a multiple of 8 from 8 to 4096";
+  if (layout.ring_bits < 2 || layout.ring_bits > 3) return "ring bits are not 2 or 3";
+  if (regions.steps.size() != regions.groups.size() * static_cast<std::size_t>(layout.sectors))
+    return "there is not one row of steps for each group and sector";
+  for (std::size_t g = 0; g < regions.groups.size(); ++g) {
+    const CertifiedGroup& group = regions.groups[g];
+    if (!std::isfinite(group.centre_x_m) || !std::isfinite(group.centre_y_m) ||
+        !std::isfinite(group.height_m) || !std::isfinite(group.radius_m) || !(group.radius_m > 0) ||
+        !std::isfinite(group.low_slope) || !std::isfinite(group.slope_step) ||
+        !(group.slope_step >= 0))
+      return "group " + std::to_string(g) + " has no proper circle, height or slopes";
+    for (std::int32_t s = 0; s < layout.sectors; ++s) {
+      const SectorSteps& steps = regions.at(static_cast<GroupIndex>(g), s);
+      for (std::size_t i = 1; i < kSteps; ++i)
+        if (steps[i] >> kSlopeBits < steps[i - 1] >> kSlopeBits)
+          return "rings of group " + std::to_string(g) + ", sector " + std::to_string(s) + " fall";
+    }
+  }
+  return {};
+}
+
+}  // namespace scarp
