@@ -145,7 +145,7 @@ void run_dem(const NamedDem& dem, const Settings& settings) {
   const HidingBounds bounds = bound_hiding(tin, leaves.group_of_triangle, leaves.count, hiding);
   const double bound_s = user_seconds() - start;
   start = user_seconds();
-  const CertifiedRegions regions = compress_bounds(bounds, bounds_of(tin.vertices));
+  const CertifiedRegions regions = compress_bounds(bounds, LeastGround(tin));
   const double compress_s = user_seconds() - start;
   if (const auto broken = check_certified(regions)) fmt::print("BROKEN: {}\n", *broken);
   CertifiedCulling certified(regions);

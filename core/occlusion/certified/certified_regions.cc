@@ -1,6 +1,7 @@
 #include "core/occlusion/certified/certified_regions.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <limits>
@@ -15,83 +16,80 @@ constexpr std::size_t kSteps = std::tuple_size_v<SectorSteps>;
 /// Bounds far above all ground say no more than those that reach this far above it.
 constexpr double kHeadroomM = 2000;
 
+/// Cameras are taken to be as often between 0 and this height above ground as between it and three
+/// times it, and so on.
+
+/// Cameras outside the data count little, but they count.
+constexpr double kOutsideWeight = 1e-6;
+
+struct Axis {
+  double x, y;
+};
+
 /// A run of rings that share one slope, and what is lost by that.
 struct Run {
   std::int32_t first;
-  double least;           // slope
-  double weight, wanted;  // sums over rings: of weights, and of weight * height
-  double cost;            // what the run loses: weighted height under the bounds of its rings
+  double least;   // slope
+  double wanted;  // sum over rings of what their own bounds are worth
+  double cost;    // what of it the run's slope loses
 };
 
-/// Heights that bounds reach, as far as cameras can be there.
-class Room {
+/// What bounds are worth in one sector: how many cameras they can hide.
+class Worth {
  public:
-  Room(const HidingBounds& bounds, const Bounds& ground, GroupIndex group)
+  Worth(const HidingBounds& bounds, const LeastGround& ground, GroupIndex group)
       : ground_(ground), circle_(bounds.circle[group]), height_m_(bounds.height_m[group]) {
     for (std::int32_t k = 0; k < kRings; ++k)
-      start_m_.push_back(ring_start(bounds.layout, k) * kFirstRing * circle_.radius_m);
-    start_m_.push_back(2 * start_m_.back());
-    low_m_ = bounds.lowest_m;
-    high_m_ = bounds.highest_m + kHeadroomM;
+      start_m_[static_cast<std::size_t>(k)] =
+          ring_start(bounds.layout, k) * kFirstRing * circle_.radius_m;
+    start_m_[kRings] = start_m_[kRings - 1] * 1.1;
   }
 
-  double slope_for(double z_m, std::int32_t ring) const {
-    return (z_m - height_m_) / start_m_[static_cast<std::size_t>(ring)];
+  void turn_to(const Axis& direction) {
+    for (std::size_t k = 0; k < kRings; ++k) {
+      const double size_m = start_m_[k + 1] - start_m_[k];
+      const double middle_m = (start_m_[k] + start_m_[k + 1]) / 2;
+      const double x_m = circle_.x_m + direction.x * middle_m;
+      const double y_m = circle_.y_m + direction.y * middle_m;
+      floor_m_[k] = ground_.around(x_m, y_m, size_m / 4);
+      weight_[k] = (ground_.is_inside(x_m, y_m) ? 1 : kOutsideWeight) * middle_m * size_m /
+                   (start_m_[0] * start_m_[0]);
+    }
   }
-  /// Below this, a bound is under all ground; the group's height is not.
-  double low_slope(std::int32_t ring) const { return slope_for(low_m_, ring); }
-  double high_slope(std::int32_t ring) const { return slope_for(high_m_, ring); }
 
-  /// Height over the middle of a ring, as far above the lowest ground as cameras can be.
-  double room_m(double slope, std::int32_t ring) const {
-    const double distance_m = middle_m(ring);
-    return std::clamp(height_m_ + slope * distance_m, low_m_, high_m_) - low_m_;
+  /// Slopes that matter in a ring: below, cameras would be under ground; above, there are none.
+  double low_slope(std::size_t k) const {
+    const double rise_m = floor_m_[k] - height_m_;
+    return rise_m / start_m_[rise_m < 0 ? k : k + 1];
+  }
+  double high_slope(std::size_t k) const {
+    return (ground_.highest_m() + kHeadroomM - height_m_) / start_m_[k];
   }
 
-  /// How many cameras are in a ring of a sector: its area, if that is over the surface.
-  double weight(std::int32_t ring, double direction_x, double direction_y) const {
-    const double distance_m = middle_m(ring);
-    const double x_m = circle_.x_m + direction_x * distance_m;
-    const double y_m = circle_.y_m + direction_y * distance_m;
-    const bool over = x_m >= ground_.low.x_m && x_m <= ground_.high.x_m &&
-                      y_m >= ground_.low.y_m && y_m <= ground_.high.y_m;
-    const double share = over ? 1 : kOutsideWeight;
-    return share * distance_m *
-           (start_m_[static_cast<std::size_t>(ring) + 1] - start_m_[static_cast<std::size_t>(ring)]) /
-           (start_m_[0] * start_m_[0]);
+  double of(double slope, std::size_t k) const {
+    const double middle_m = (start_m_[k] + start_m_[k + 1]) / 2;
+    const double above_m = height_m_ + slope * middle_m - floor_m_[k];
+    if (!(above_m > 0)) return 0;
+    return weight_[k] * std::sqrt(std::min(above_m, kHeadroomM));
   }
 
  private:
-  /// Cameras outside the data count little, but they count.
-  static constexpr double kOutsideWeight = 1e-4;
-
-  double middle_m(std::int32_t ring) const {
-    const auto k = static_cast<std::size_t>(ring);
-    return (start_m_[k] + start_m_[k + 1]) / 2;
-  }
-
-  Bounds ground_;
-  Circle circle_;
-  double height_m_, low_m_, high_m_;
-  std::vector<double> start_m_;  // [kRings + 1]
+  const LeastGround& ground_;
+  const Circle circle_;
+  const double height_m_;
+  std::array<double, kRings + 1> start_m_{};
+  std::array<double, kRings> floor_m_{}, weight_{};
 };
 
 /// Joins neighbouring runs until kSteps are left, cheapest first.
 class Joining {
  public:
-  Joining(const Room& room, std::span<const float> slopes, std::span<const double> weights)
-      : room_(room), weights_(weights) {
-    for (std::int32_t k = 0; k < kRings; ++k) {
-      const double slope = static_cast<double>(slopes[static_cast<std::size_t>(k)]);
-      const double useful = slope < room.low_slope(k) ? -HUGE_VAL : std::min(slope, room.high_slope(k));
-      const double weight = weights[static_cast<std::size_t>(k)];
-      const double height_m = useful > -HUGE_VAL ? room.room_m(useful, k) : 0;
-      Run run{k, useful, weight, weight * height_m, 0};
-      if (!runs_.empty() && runs_.back().least == useful && useful == -HUGE_VAL) {
-        runs_.back().weight += weight;
-        continue;
-      }
-      runs_.push_back(run);
+  Joining(const Worth& worth, std::span<const float> slopes) : worth_(worth) {
+    for (std::size_t k = 0; k < kRings; ++k) {
+      const auto slope = static_cast<double>(slopes[k]);
+      const double wanted = slope >= worth.low_slope(k) ? worth.of(slope, k) : 0;
+      // A bound that is of no use here may still let a run pass over the ring.
+      runs_.push_back({static_cast<std::int32_t>(k), slope, wanted, 0});
     }
   }
 
@@ -114,12 +112,12 @@ class Joining {
     return i + 1 < runs_.size() ? runs_[i + 1].first : kRings;
   }
   Run joined(std::size_t i) const {
-    Run run{runs_[i].first, std::min(runs_[i].least, runs_[i + 1].least), 0,
+    Run run{runs_[i].first, std::min(runs_[i].least, runs_[i + 1].least),
             runs_[i].wanted + runs_[i + 1].wanted, 0};
     double kept = 0;
     if (run.least > -HUGE_VAL)
       for (std::int32_t k = run.first; k < end_of(i + 1); ++k)
-        kept += weights_[static_cast<std::size_t>(k)] * room_.room_m(run.least, k);
+        kept += worth_.of(run.least, static_cast<std::size_t>(k));
     run.cost = run.wanted - kept;
     return run;
   }
@@ -127,13 +125,8 @@ class Joining {
     return joined(i).cost - runs_[i].cost - runs_[i + 1].cost;
   }
 
-  const Room& room_;
-  std::span<const double> weights_;
+  const Worth& worth_;
   std::vector<Run> runs_;
-};
-
-struct Axis {
-  double x, y;
 };
 
 /// Middle directions of the sectors.
@@ -170,18 +163,19 @@ std::uint16_t slope_code(const CertifiedGroup& group, double slope) {
   return static_cast<std::uint16_t>(code);
 }
 
-void compress_group(const HidingBounds& bounds, const Bounds& ground,
+void compress_group(const HidingBounds& bounds, const LeastGround& ground,
                     const std::vector<Axis>& directions, GroupIndex g, CertifiedRegions& regions) {
   const auto sectors = static_cast<std::size_t>(regions.layout.sectors);
-  const Room room(bounds, ground, g);
+  Worth worth(bounds, ground, g);
   std::vector<std::vector<Run>> runs(sectors);
   double low = HUGE_VAL, high = -HUGE_VAL;
-  std::vector<double> weights(kRings);
   for (std::size_t s = 0; s < sectors; ++s) {
-    for (std::int32_t k = 0; k < kRings; ++k)
-      weights[static_cast<std::size_t>(k)] = room.weight(k, directions[s].x, directions[s].y);
-    runs[s] = Joining(room, bounds.at(g, static_cast<std::int32_t>(s)), weights).join();
-    for (const Run& run : runs[s]) {
+    worth.turn_to(directions[s]);
+    runs[s] = Joining(worth, bounds.at(g, static_cast<std::int32_t>(s))).join();
+    for (Run& run : runs[s]) {
+      // A finer scale is worth more than slopes that are of use to no camera.
+      run.least = std::min(run.least, worth.high_slope(static_cast<std::size_t>(run.first)));
+      if (run.wanted - run.cost <= 0) run.least = -HUGE_VAL;
       if (run.least == -HUGE_VAL) continue;
       low = std::min(low, run.least);
       high = std::max(high, run.least);
@@ -208,7 +202,7 @@ void compress_group(const HidingBounds& bounds, const Bounds& ground,
 
 }  // namespace
 
-CertifiedRegions compress_bounds(const HidingBounds& bounds, const Bounds& ground) {
+CertifiedRegions compress_bounds(const HidingBounds& bounds, const LeastGround& ground) {
   CertifiedRegions regions;
   regions.layout = bounds.layout;
   regions.groups.resize(bounds.circle.size());
@@ -225,7 +219,7 @@ CertifiedRegions certify_groups(const Tin& tin, std::span<const GroupIndex> grou
                                 const Progress& progress) {
   if (groups == 0) return {{options.sectors, 2}, {}, {}};
   return compress_bounds(bound_hiding(tin, group_of_triangle, groups, options, progress),
-                         bounds_of(tin.vertices));
+                         LeastGround(tin));
 }
 
 bool hides_group(const CertifiedRegions& regions, GroupIndex group, const Position& eye) {

@@ -8,6 +8,7 @@
 
 #include "core/geodesy/position.h"
 #include "core/occlusion/certified/hiding_bounds.h"
+#include "core/occlusion/certified/least_ground.h"
 #include "core/occlusion/certified/polar_cells.h"
 
 namespace scarp {
@@ -69,7 +70,7 @@ inline bool hides_at(const CertifiedGroup& group, const SectorSteps& steps, std:
 
 /// Bounds in the form that is kept: in each sector, rings are joined until four steps are left,
 /// those first that lose least of the room that cameras can be in; slopes are rounded down.
-CertifiedRegions compress_bounds(const HidingBounds& bounds, const Bounds& ground);
+CertifiedRegions compress_bounds(const HidingBounds& bounds, const LeastGround& ground);
 
 /// Regions of groups of a surface. Requires what bound_hiding does.
 CertifiedRegions certify_groups(const Tin& tin, std::span<const GroupIndex> group_of_triangle,

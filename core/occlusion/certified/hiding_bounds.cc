@@ -179,13 +179,13 @@ class Bounding {
   void draw_circles(std::uint32_t groups) {
     for (GroupIndex g = 0; g < groups; ++g) {
       std::vector<Position> corners;
-      double sum_m = 0;
+      double top_m = -HUGE_VAL;
       for (std::size_t i = parts_.first[g]; i < parts_.first[g + 1]; ++i)
         for (const VertexIndex v : tin_.triangles[parts_.triangles[i]]) {
           corners.push_back(tin_.vertices[v]);
-          sum_m += tin_.vertices[v].z_m;
+          top_m = std::max(top_m, tin_.vertices[v].z_m);
         }
-      bounds_.height_m.push_back(round_to_lattice(sum_m / static_cast<double>(corners.size())));
+      bounds_.height_m.push_back(top_m);
       bounds_.circle.push_back(enclosing_circle(convex_hull(std::move(corners))));
     }
   }
