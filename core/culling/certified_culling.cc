@@ -32,8 +32,8 @@ class ViewWedge {
   bool may_show(const CertifiedGroup& group) const {
     if (shows_all_) return true;
     const double x_m = group.centre_x_m - eye_.x_m, y_m = group.centre_y_m - eye_.y_m;
-    const double reach_m = static_cast<double>(group.radius_m) +
-                           (std::abs(x_m) + std::abs(y_m)) * kViewRounding;
+    const double reach_m =
+        static_cast<double>(group.radius_m) + (std::abs(x_m) + std::abs(y_m)) * kViewRounding;
     const bool left_of_from = from_x_ * y_m - from_y_ * x_m >= -reach_m;
     const bool right_of_to = to_y_ * x_m - to_x_ * y_m >= -reach_m;
     return is_convex_ ? left_of_from && right_of_to : left_of_from || right_of_to;
@@ -67,8 +67,7 @@ void place_camera(const CertifiedRegions& regions, const Position& eye, std::siz
     // Within the circle there is no ring, and perhaps no direction.
     const bool is_near = !(ring_square[i] >= 1);
     block.ring[i] = is_near ? -1 : ring_of(regions.layout, ring_square[i]);
-    block.sector[i] =
-        is_near ? 0 : sector_of(regions.layout, block.x_m[i], block.y_m[i]);
+    block.sector[i] = is_near ? 0 : sector_of(regions.layout, block.x_m[i], block.y_m[i]);
   }
 }
 

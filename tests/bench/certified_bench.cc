@@ -60,7 +60,8 @@ constexpr NamedDem kDems[] = {
 double user_seconds() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_utime.tv_sec) + 1e-6 * static_cast<double>(usage.ru_utime.tv_usec);
+  return static_cast<double>(usage.ru_utime.tv_sec) +
+         1e-6 * static_cast<double>(usage.ru_utime.tv_usec);
 }
 
 struct Settings {
@@ -86,12 +87,13 @@ bool fine_culls(const HidingBounds& bounds, GroupIndex g, const Position& eye) {
   const double ratio = distance_m / (c.radius_m * kFirstRing);
   if (!(ratio >= 1)) return false;
   const std::int32_t ring = ring_of(bounds.layout, static_cast<float>(ratio * ratio));
-  const double slope = static_cast<double>(bounds.at(g, sector_of(bounds.layout, dx, dy))[static_cast<std::size_t>(ring)]);
+  const double slope = static_cast<double>(
+      bounds.at(g, sector_of(bounds.layout, dx, dy))[static_cast<std::size_t>(ring)]);
   return eye.z_m < bounds.height_m[g] + slope * distance_m;
 }
 
-std::vector<std::uint8_t> fine_culled(const HidingBounds& bounds, std::span<const GroupIndex> group_of,
-                                      const Position& eye) {
+std::vector<std::uint8_t> fine_culled(const HidingBounds& bounds,
+                                      std::span<const GroupIndex> group_of, const Position& eye) {
   std::vector<std::uint8_t> group_culled(bounds.circle.size());
   for (GroupIndex g = 0; g < group_culled.size(); ++g) group_culled[g] = fine_culls(bounds, g, eye);
   std::vector<std::uint8_t> culled(group_of.size());
@@ -121,11 +123,12 @@ std::map<std::string, std::array<std::vector<double>, 4>> all_shares;
 void print_rows(const std::string& method, const std::array<Counts, 4>& rows) {
   for (std::size_t h = 0; h < 4; ++h) {
     const Counts& c = rows[h];
-    fmt::print("  {:<10} {:>5.0f} m  hidden {:5.1f} %  in hidden groups {:5.1f} %  culled {:5.1f} %  "
-               "share {:.3f}  of hidden {:.3f}  false {}\n",
-               method, kHeights[h], 100 * c.hidden / c.triangles, 100 * c.in_hidden / c.triangles,
-               100 * c.culled / c.triangles, c.culled / std::max(1.0, c.in_hidden),
-               c.culled / std::max(1.0, c.hidden), c.falsely);
+    fmt::print(
+        "  {:<10} {:>5.0f} m  hidden {:5.1f} %  in hidden groups {:5.1f} %  culled {:5.1f} %  "
+        "share {:.3f}  of hidden {:.3f}  false {}\n",
+        method, kHeights[h], 100 * c.hidden / c.triangles, 100 * c.in_hidden / c.triangles,
+        100 * c.culled / c.triangles, c.culled / std::max(1.0, c.in_hidden),
+        c.culled / std::max(1.0, c.hidden), c.falsely);
     if (c.in_hidden > 0.005 * c.triangles) all_shares[method][h].push_back(c.culled / c.in_hidden);
   }
   std::fflush(stdout);
@@ -134,14 +137,16 @@ void print_rows(const std::string& method, const std::array<Counts, 4>& rows) {
 void run_dem(const NamedDem& dem, const Settings& settings) {
   const auto path = test::shared_data(dem.file);
   if (!path) return;
-  const SampleGrid grid = test::dem_window(*path, dem.column, dem.row, dem.columns, dem.rows, dem.cell_m);
+  const SampleGrid grid =
+      test::dem_window(*path, dem.column, dem.row, dem.columns, dem.rows, dem.cell_m);
   MeshOptions mesh_options;
   mesh_options.vertex_budget = settings.vertices;
   const Tin tin = mesh_samples(grid, mesh_options, {}).tin;
   const LeafGroups leaves = group_by_squares(tin, settings.group_triangles);
   double start = user_seconds();
   HidingOptions hiding = settings.hiding;
-  if (settings.bytes > 0) hiding.sectors = sectors_within(settings.bytes, tin.triangles.size(), leaves.count);
+  if (settings.bytes > 0)
+    hiding.sectors = sectors_within(settings.bytes, tin.triangles.size(), leaves.count);
   const HidingBounds bounds = bound_hiding(tin, leaves.group_of_triangle, leaves.count, hiding);
   const double bound_s = user_seconds() - start;
   start = user_seconds();
@@ -149,10 +154,15 @@ void run_dem(const NamedDem& dem, const Settings& settings) {
   const double compress_s = user_seconds() - start;
   if (const auto broken = check_certified(regions)) fmt::print("BROKEN: {}\n", *broken);
   CertifiedCulling certified(regions);
-  fmt::print("{}: {} triangles, {} groups; bounds {:.1f} s = {:.0f} us a triangle, compression {:.0f} us; {} sectors, {:.1f} bytes a triangle\n", dem.name,
-             tin.triangles.size(), leaves.count, bound_s, 1e6 * bound_s / static_cast<double>(tin.triangles.size()),
-             1e6 * compress_s / static_cast<double>(tin.triangles.size()), regions.layout.sectors,
-             static_cast<double>(regions.groups.size() * sizeof(CertifiedGroup) + regions.steps.size() * sizeof(SectorSteps)) / static_cast<double>(tin.triangles.size()));
+  fmt::print(
+      "{}: {} triangles, {} groups; bounds {:.1f} s = {:.0f} us a triangle, compression {:.0f} us; "
+      "{} sectors, {:.1f} bytes a triangle\n",
+      dem.name, tin.triangles.size(), leaves.count, bound_s,
+      1e6 * bound_s / static_cast<double>(tin.triangles.size()),
+      1e6 * compress_s / static_cast<double>(tin.triangles.size()), regions.layout.sectors,
+      static_cast<double>(regions.groups.size() * sizeof(CertifiedGroup) +
+                          regions.steps.size() * sizeof(SectorSteps)) /
+          static_cast<double>(tin.triangles.size()));
   std::optional<Groups> thesis;
   if (settings.thesis)
     thesis = build_group_tree(tin, stewart_horizons(tin.vertices, {}, {}), leaves);
@@ -184,13 +194,16 @@ void run_dem(const NamedDem& dem, const Settings& settings) {
 int run(const Settings& settings) {
   GDALAllRegister();
   for (const NamedDem& dem : kDems)
-    if (settings.dem.empty() || ("," + settings.dem + ",").find("," + std::string(dem.name) + ",") != std::string::npos) run_dem(dem, settings);
+    if (settings.dem.empty() ||
+        ("," + settings.dem + ",").find("," + std::string(dem.name) + ",") != std::string::npos)
+      run_dem(dem, settings);
   for (const auto& [method, shares] : all_shares) {
     fmt::print("mean {:<10}", method);
     for (const auto& share : shares) {
       double sum = 0;
       for (const double s : share) sum += s;
-      fmt::print(" {:.3f} ({})", sum / static_cast<double>(std::max<std::size_t>(1, share.size())), share.size());
+      fmt::print(" {:.3f} ({})", sum / static_cast<double>(std::max<std::size_t>(1, share.size())),
+                 share.size());
     }
     fmt::print("\n");
   }
@@ -209,19 +222,32 @@ int main(int argc, char** argv) {
       continue;
     }
     const std::string value = i + 1 < argc ? argv[++i] : "";
-    if (name == "--vertices") settings.vertices = static_cast<std::uint32_t>(std::stoul(value));
-    else if (name == "--eyes") settings.eyes = std::stoi(value);
-    else if (name == "--dem") settings.dem = value;
-    else if (name == "--bytes") settings.bytes = std::stod(value);
-    else if (name == "--fans") settings.hiding.fans = std::stoi(value);
-    else if (name == "--sectors") settings.hiding.sectors = std::stoi(value);
-    else if (name == "--spacing") settings.hiding.spacing = std::stod(value);
-    else if (name == "--width") settings.hiding.width = std::stod(value);
-    else if (name == "--piece") settings.hiding.piece = std::stod(value);
-    else if (name == "--group-triangles") settings.group_triangles = static_cast<std::uint32_t>(std::stoul(value));
-    else if (name == "--seed") settings.seed = std::stoull(value);
-    else if (name == "--threads") scarp::set_thread_count(std::stoi(value));
-    else return 2;
+    if (name == "--vertices")
+      settings.vertices = static_cast<std::uint32_t>(std::stoul(value));
+    else if (name == "--eyes")
+      settings.eyes = std::stoi(value);
+    else if (name == "--dem")
+      settings.dem = value;
+    else if (name == "--bytes")
+      settings.bytes = std::stod(value);
+    else if (name == "--fans")
+      settings.hiding.fans = std::stoi(value);
+    else if (name == "--sectors")
+      settings.hiding.sectors = std::stoi(value);
+    else if (name == "--spacing")
+      settings.hiding.spacing = std::stod(value);
+    else if (name == "--width")
+      settings.hiding.width = std::stod(value);
+    else if (name == "--piece")
+      settings.hiding.piece = std::stod(value);
+    else if (name == "--group-triangles")
+      settings.group_triangles = static_cast<std::uint32_t>(std::stoul(value));
+    else if (name == "--seed")
+      settings.seed = std::stoull(value);
+    else if (name == "--threads")
+      scarp::set_thread_count(std::stoi(value));
+    else
+      return 2;
   }
   return scarp::run(settings);
 }

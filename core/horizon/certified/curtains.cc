@@ -69,8 +69,8 @@ void Curtains::hang_piece(std::int32_t row, const FanPlace& from, const FanPlace
   const auto first = static_cast<std::int32_t>(strip_at(left.v_m - error_m_));
   const auto last = static_cast<std::int32_t>(strip_at(right.v_m + error_m_));
   const double least_m = std::min(left.z_m, right.z_m);
-  float* out = by_row_.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(strips_) +
-               first;
+  float* out =
+      by_row_.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(strips_) + first;
   const double piece_m = right.v_m - left.v_m;
   // A piece that is hardly longer than its rounding has no slope worth computing.
   const double slope = piece_m > width_m_ / 16 ? (right.z_m - left.z_m) / piece_m : 0;
@@ -97,8 +97,7 @@ void Curtains::open_border(const FanPlace& a, const FanPlace& b) {
     if (last.u_m < u_m) break;
     const double v_m = crossing(first, last, u_m).v_m;
     const auto from = std::max(0, static_cast<std::int32_t>(strip_at(v_m - 2 * error_m_)));
-    const auto to =
-        std::min(strips_ - 1, static_cast<std::int32_t>(strip_at(v_m + 2 * error_m_)));
+    const auto to = std::min(strips_ - 1, static_cast<std::int32_t>(strip_at(v_m + 2 * error_m_)));
     for (std::int32_t s = from; s <= to; ++s)
       by_row_[static_cast<std::size_t>(row) * static_cast<std::size_t>(strips_) +
               static_cast<std::size_t>(s)] = kVoid;

@@ -46,25 +46,22 @@ void visit_skyline(const Curtains& curtains, const FanView& view, const Piece& p
   const double far_u_m = std::min(piece.a.u_m, piece.b.u_m);
   const double low_v_m = std::min(piece.a.v_m, piece.b.v_m) - error_m;
   const double high_v_m = std::max(piece.a.v_m, piece.b.v_m) + error_m;
-  const auto middle = std::clamp(
-      static_cast<std::int32_t>(curtains.strip_at(low_v_m + (high_v_m - low_v_m) / 2)), 0,
-      curtains.strips() - 1);
+  const auto middle =
+      std::clamp(static_cast<std::int32_t>(curtains.strip_at(low_v_m + (high_v_m - low_v_m) / 2)),
+                 0, curtains.strips() - 1);
   const double end_row = std::min(curtains.row_at(end_u_m), curtains.rows() - 1.0);
   if (!(end_row >= 0)) return;
   const auto last = static_cast<std::int32_t>(end_row);
   auto row = std::max(0, static_cast<std::int32_t>(curtains.row_at(near_u_m)));
   while (row <= last && !(curtains.u_of(row) > near_u_m + 4 * error_m)) ++row;
   double base_m = -std::numeric_limits<double>::infinity();
-  const auto aim = [&] {
-    base_m = std::max(a_m - slope * piece.a.u_m, b_m - slope * piece.b.u_m);
-  };
+  const auto aim = [&] { base_m = std::max(a_m - slope * piece.a.u_m, b_m - slope * piece.b.u_m); };
   const bool has_slope = slope > -std::numeric_limits<double>::infinity();
   if (has_slope) aim();
   std::int32_t level = 0;
   while (row <= last) {
     // Whether a curtain of the block can reach above the line.
-    const double best_u_m =
-        slope >= 0 ? curtains.u_of(row) : curtains.u_of(row + (1 << level) - 1);
+    const double best_u_m = slope >= 0 ? curtains.u_of(row) : curtains.u_of(row + (1 << level) - 1);
     const double line_m = base_m + (base_m > -HUGE_VAL ? slope * best_u_m : 0);
     if (!(static_cast<double>(curtains.highest(level, middle, row >> level)) > line_m)) {
       row += 1 << level;
@@ -87,12 +84,12 @@ void visit_skyline(const Curtains& curtains, const FanView& view, const Piece& p
       least = std::min(least, *s);
     const auto height_m = static_cast<double>(least);
     if (height_m > line_here_m) {
-      const auto slope_from = [&](const FanPlace& end, double end_m) {
-        const double rise_m = height_m - end_m;
-        return rise_m / (u_m - end.u_m + (rise_m > 0 ? error_m : -error_m));
+      const auto slope_from = [&](const FanPlace& corner, double corner_m) {
+        const double rise_m = height_m - corner_m;
+        return rise_m / (u_m - corner.u_m + (rise_m > 0 ? error_m : -error_m));
       };
-      const double steeper = std::min(slope_from(piece.a, a_m), slope_from(piece.b, b_m)) -
-                             view.height_error_m;
+      const double steeper =
+          std::min(slope_from(piece.a, a_m), slope_from(piece.b, b_m)) - view.height_error_m;
       if (steeper > slope) {
         slope = steeper;
         aim();

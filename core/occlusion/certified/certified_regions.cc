@@ -97,7 +97,8 @@ class Joining {
     std::vector<double> price;
     for (std::size_t i = 0; i + 1 < runs_.size(); ++i) price.push_back(price_of(i));
     while (runs_.size() > kSteps) {
-      const auto i = static_cast<std::size_t>(std::min_element(price.begin(), price.end()) - price.begin());
+      const auto i =
+          static_cast<std::size_t>(std::min_element(price.begin(), price.end()) - price.begin());
       runs_[i] = joined(i);
       runs_.erase(runs_.begin() + static_cast<std::ptrdiff_t>(i) + 1);
       price.erase(price.begin() + static_cast<std::ptrdiff_t>(i));
@@ -139,8 +140,8 @@ std::vector<Axis> directions_of(const PolarLayout& layout) {
     const double part = eighths - eighth;
     const double f = eighth % 2 == 0 ? part : 1 - part;
     const double s = (1.273 - std::sqrt(1.273 * 1.273 - 4 * 0.273 * f)) / (2 * 0.273);
-    const double azimuth_rad =
-        M_PI / 4 * (eighth % 2 == 0 ? eighth : eighth + 1) + (eighth % 2 == 0 ? 1 : -1) * std::atan(s);
+    const double azimuth_rad = M_PI / 4 * (eighth % 2 == 0 ? eighth : eighth + 1) +
+                               (eighth % 2 == 0 ? 1 : -1) * std::atan(s);
     axes.push_back({std::cos(azimuth_rad), std::sin(azimuth_rad)});
   }
   return axes;

@@ -58,14 +58,13 @@ struct RingTable {
         const double low = -1 + 2.0 * static_cast<double>(lane) / kLanes;
         const double high = low + 2.0 / kLanes;
         const double offset = std::max(std::abs(low), std::abs(high));
-        const double least = std::sqrt(near * near - offset * offset) * fan.cos_half -
-                             offset * fan.sin_half;
+        const double least =
+            std::sqrt(near * near - offset * offset) * fan.cos_half - offset * fan.sin_half;
         reach[lane][k] = least * (1 - 0x1p-40);
         forward[lane][k] = static_cast<float>(least / near);
-        turn_low[lane][k] = std::asin(low / (low < 0 ? near : far)) - fan.half_rad -
-                            kCellOverlap;
-        turn_high[lane][k] = std::asin(high / (high > 0 ? near : far)) + fan.half_rad +
-                             kCellOverlap;
+        turn_low[lane][k] = std::asin(low / (low < 0 ? near : far)) - fan.half_rad - kCellOverlap;
+        turn_high[lane][k] =
+            std::asin(high / (high > 0 ? near : far)) + fan.half_rad + kCellOverlap;
       }
     }
   }
@@ -136,9 +135,9 @@ class Bounding {
     // The finer rings where they reach over the whole surface.
     const double reach = std::hypot(width_m, depth_m) / radius_m;
     bounds_.layout = {options.sectors, reach < ring_start({8, 3}, kRings - 1) ? 3 : 2};
-    bounds_.slope.assign(static_cast<std::size_t>(groups) *
-                             static_cast<std::size_t>(options.sectors) * kRings,
-                         kEverything);
+    bounds_.slope.assign(
+        static_cast<std::size_t>(groups) * static_cast<std::size_t>(options.sectors) * kRings,
+        kEverything);
   }
 
   HidingBounds run(const Progress& progress) {
@@ -228,12 +227,13 @@ class Bounding {
     const Circle& circle = bounds_.circle[group];
     float* cells = bounds_.slope.data() + static_cast<std::size_t>(group) *
                                               static_cast<std::size_t>(options_.sectors) * kRings;
-    Look look{view, curtains, rings, turns, {}, circle.radius_m, bounds_.height_m[group], cells, {}};
+    Look look{view,  curtains, rings, turns, {}, circle.radius_m, bounds_.height_m[group],
+              cells, {}};
     look.centre =
         place_in(view.fan, circle.x_m - origin_x_m_, circle.y_m - origin_y_m_, look.height_m);
     for (std::size_t k = 0; k < kRings; ++k)
-      look.floor[k] =
-          static_cast<float>((bounds_.lowest_m - look.height_m) / (look.radius_m / rings.near_inverse[k]));
+      look.floor[k] = static_cast<float>((bounds_.lowest_m - look.height_m) /
+                                         (look.radius_m / rings.near_inverse[k]));
     const std::size_t first = parts_.first[group];
     for (std::size_t i = first; i < parts_.first[group + 1]; ++i) {
       const bool lowered = look_from_triangle(look, parts_.triangles[i]);
@@ -301,8 +301,8 @@ class Bounding {
     if (!(area > 0x1p-30 * size)) return -HUGE_VAL;  // a sliver's plane is left unused
     const double along = rise_x * view.fan.axis_x + rise_y * view.fan.axis_y;
     const double across = rise_y * view.fan.axis_x - rise_x * view.fan.axis_y;
-    const double sizes = std::abs(az * by) + std::abs(ay * bz) + std::abs(ax * bz) +
-                         std::abs(az * bx);
+    const double sizes =
+        std::abs(az * by) + std::abs(ay * bz) + std::abs(ax * bz) + std::abs(az * bx);
     const double slope = (along - std::abs(across) * view.fan.tan_half) / area;
     return slope - (0x1p-48 * sizes + std::abs(slope) * 0x1p-48 * size) / area * 2;
   }
@@ -316,9 +316,9 @@ class Bounding {
     const FanView& view = look.view;
     const double ua = piece.a.u_m - look.centre.u_m, ub = piece.b.u_m - look.centre.u_m;
     const double va = piece.a.v_m - look.centre.v_m, vb = piece.b.v_m - look.centre.v_m;
-    const double slack_m =
-        std::max(std::abs(ua), std::abs(ub)) * view.fan.sin_half +
-        std::max(std::abs(va), std::abs(vb)) * (1 - view.fan.cos_half) + 8 * view.error_m;
+    const double slack_m = std::max(std::abs(ua), std::abs(ub)) * view.fan.sin_half +
+                           std::max(std::abs(va), std::abs(vb)) * (1 - view.fan.cos_half) +
+                           8 * view.error_m;
     const auto lane_of = [&](double offset_m) {
       const double lane = (offset_m / look.radius_m + 1) * (kLanes / 2);
       return std::clamp(static_cast<std::int32_t>(std::floor(lane)), 0, kLanes - 1);
@@ -328,7 +328,7 @@ class Bounding {
     // The outer of the lanes has the least reach.
     const std::size_t outer =
         2 * std::max(from_lane, to_lane) >= kLanes && kLanes - 1 - to_lane < from_lane ? to_lane
-                                                                                    : from_lane;
+                                                                                       : from_lane;
     const RingRow& forward = look.rings.forward[outer];
     const auto& reach = look.rings.reach[outer];
     const RingRow goal = goal_of(look, from_lane, to_lane);
@@ -358,9 +358,8 @@ class Bounding {
     };
     bool done = false;
     if (plane_slope > -HUGE_VAL) {
-      const FanPlace& end = piece.a.z_m - plane_slope * ua < piece.b.z_m - plane_slope * ub
-                                ? piece.a
-                                : piece.b;
+      const FanPlace& end =
+          piece.a.z_m - plane_slope * ua < piece.b.z_m - plane_slope * ub ? piece.a : piece.b;
       aim({end.u_m, end.z_m, plane_slope});
       done = suffices();
     }

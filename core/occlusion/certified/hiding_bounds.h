@@ -14,11 +14,11 @@ namespace scarp {
 
 /// How finely hiding is bounded. Every setting is safe; finer ones find more.
 struct HidingOptions {
-  std::int32_t fans = 512;      ///< of directions; a multiple of 8
-  std::int32_t sectors = 248;   ///< of camera azimuths around a group
-  double spacing = 0.5;         ///< of curtains, in mean distances between vertices
-  double width = 0.5;           ///< of strips, in the same unit
-  double piece = 1.0;           ///< greatest length of a target, in the same unit
+  std::int32_t fans = 512;     ///< of directions; a multiple of 8
+  std::int32_t sectors = 248;  ///< of camera azimuths around a group
+  double spacing = 0.5;        ///< of curtains, in mean distances between vertices
+  double width = 0.5;          ///< of strips, in the same unit
+  double piece = 1.0;          ///< greatest length of a target, in the same unit
 };
 
 /// For each group, sector of azimuths and ring of distances that a camera can have from the
@@ -26,15 +26,16 @@ struct HidingOptions {
 /// under height_m + slope * distance. -infinity where nothing is known to be hidden.
 struct HidingBounds {
   PolarLayout layout;
-  double lowest_m = 0;   ///< of the ground
-  double highest_m = 0;  ///< of the ground
-  std::vector<Circle> circle;     ///< [groups]
-  std::vector<double> height_m;   ///< [groups]
-  std::vector<float> slope;       ///< [groups * sectors * kRings]
+  double lowest_m = 0;           ///< of the ground
+  double highest_m = 0;          ///< of the ground
+  std::vector<Circle> circle;    ///< [groups]
+  std::vector<double> height_m;  ///< [groups]
+  std::vector<float> slope;      ///< [groups * sectors * kRings]
 
   std::span<const float> at(GroupIndex group, std::int32_t sector) const {
-    const std::size_t row = static_cast<std::size_t>(group) * static_cast<std::size_t>(layout.sectors) +
-                            static_cast<std::size_t>(sector);
+    const std::size_t row =
+        static_cast<std::size_t>(group) * static_cast<std::size_t>(layout.sectors) +
+        static_cast<std::size_t>(sector);
     return {slope.data() + row * kRings, kRings};
   }
 };

@@ -38,11 +38,12 @@ LeastGround::LeastGround(const Tin& tin) {
         static_cast<std::size_t>(above.columns) * static_cast<std::size_t>(above.rows), kEmpty);
     for (std::int32_t row = 0; row < below.rows; ++row)
       for (std::int32_t column = 0; column < below.columns; ++column) {
-        float& least_m = above.least_m[static_cast<std::size_t>(row / 2 * above.columns + column / 2)];
-        least_m = std::min(least_m,
-                           below.least_m[static_cast<std::size_t>(row) *
-                                             static_cast<std::size_t>(below.columns) +
-                                         static_cast<std::size_t>(column)]);
+        float& least_m =
+            above.least_m[static_cast<std::size_t>(row / 2 * above.columns + column / 2)];
+        least_m = std::min(
+            least_m,
+            below.least_m[static_cast<std::size_t>(row) * static_cast<std::size_t>(below.columns) +
+                          static_cast<std::size_t>(column)]);
       }
     levels_.push_back(std::move(above));
   }

@@ -40,8 +40,7 @@ inline double ring_start(const PolarLayout& layout, std::int32_t ring) {
 /// Ring of a distance by its square in units of kFirstRing radii; below 0 nearer than ring 0.
 inline std::int32_t ring_of(const PolarLayout& layout, float square) {
   const auto bits = std::bit_cast<std::int32_t>(square);
-  const std::int32_t ring =
-      (bits >> (23 - layout.ring_bits)) - (127 << layout.ring_bits);
+  const std::int32_t ring = (bits >> (23 - layout.ring_bits)) - (127 << layout.ring_bits);
   return std::min(ring, kRings - 1);
 }
 
