@@ -14,6 +14,7 @@
 #include "core/error/error.h"
 #include "core/horizon/stewart.h"
 #include "core/occlusion/build_groups.h"
+#include "core/occlusion/certified/certify_groups.h"
 #include "core/raster/preview.h"
 #include "ingest/dem/dem.h"
 #include "ingest/footprints/footprints.h"
@@ -29,6 +30,9 @@ namespace scarp {
 namespace {
 
 constexpr char kTile[] = "0/0/0";
+
+/// What certified regions may take, bytes a triangle of the mesh.
+constexpr double kCertifiedBytes = 16;
 
 /// One build from options to a finished scene, a member function a stage.
 class Build {
@@ -46,6 +50,8 @@ class Build {
     stage("mesh", [&](const Progress& p) { mesh(p); });
     stage("horizons", [&](const Progress& p) { horizons(p); });
     stage("groups", [&](const Progress& p) { groups(p); });
+    if (options_.horizon == "certified") stage("certify", [&](const Progress& p) { certify(p); });
+    stage("write groups", [&](const Progress&) { write_group_file(); });
     stage("layers", [&](const Progress& p) { layers(p); });
     stage("preview", [&](const Progress&) { preview(); });
     finish();
@@ -119,6 +125,17 @@ class Build {
       if (options_.max_groups > 0) crystals.max_groups = options_.max_groups;
       groups_ = build_groups(mesh_.tin, horizon_, crystals, progress, &grouping_);
     }
+  }
+
+  void certify(const Progress& progress) {
+    HidingOptions hiding;
+    hiding.sectors =
+        sectors_within(kCertifiedBytes, mesh_.tin.triangles.size(), groups_.leaf_count);
+    groups_.certified =
+        certify_groups(mesh_.tin, groups_.group_of_triangle, groups_.leaf_count, hiding, progress);
+  }
+
+  void write_group_file() {
     write_groups(writer_.path_for(tile_file_name(kTile, "groups")), groups_, Existing::kRefuse);
     tile_.files.push_back(writer_.record(tile_file_name(kTile, "groups"), "groups"));
   }
@@ -203,7 +220,7 @@ class Build {
     scene.raster = {dem_.columns, dem_.rows, dem_.geotransform};
     scene.parameters = {{"sectors", std::int64_t{options_.sectors}},
                         {"subsectors", std::int64_t{options_.subsectors}},
-                        {"horizon", std::string("stewart")},
+                        {"horizon", options_.horizon},
                         {"growth", growth_name(options_.growth)},
                         {"group_triangles", std::int64_t{options_.group_triangles}},
                         {"min_group_triangles", std::int64_t{options_.min_group_triangles}},

@@ -19,7 +19,7 @@
 #include "core/culling/certified_culling.h"
 #include "core/culling/visible_groups.h"
 #include "core/horizon/stewart.h"
-#include "core/occlusion/certified/hiding_bounds.h"
+#include "core/occlusion/certified/certify_groups.h"
 #include "core/occlusion/group_tree.h"
 #include "core/occlusion/splitmix64.h"
 #include "core/occlusion/squares.h"

@@ -1,14 +1,14 @@
 #pragma once
 
 #include <array>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/geodesy/position.h"
-#include "core/occlusion/certified/hiding_bounds.h"
-#include "core/occlusion/certified/least_ground.h"
 #include "core/occlusion/certified/polar_cells.h"
 
 namespace scarp {
@@ -37,7 +37,7 @@ struct CertifiedRegions {
   std::vector<CertifiedGroup> groups;
   std::vector<SectorSteps> steps;  ///< [groups * layout.sectors]
 
-  const SectorSteps& at(GroupIndex group, std::int32_t sector) const {
+  const SectorSteps& at(std::uint32_t group, std::int32_t sector) const {
     return steps[static_cast<std::size_t>(group) * static_cast<std::size_t>(layout.sectors) +
                  static_cast<std::size_t>(sector)];
   }
@@ -68,18 +68,9 @@ inline bool hides_at(const CertifiedGroup& group, const SectorSteps& steps, std:
   return code > 0 && rise_m < line_m - margin_m;
 }
 
-/// Bounds in the form that is kept: in each sector, rings are joined until four steps are left,
-/// those first that lose least of the room that cameras can be in; slopes are rounded down.
-CertifiedRegions compress_bounds(const HidingBounds& bounds, const LeastGround& ground);
-
-/// Regions of groups of a surface. Requires what bound_hiding does.
-CertifiedRegions certify_groups(const Tin& tin, std::span<const GroupIndex> group_of_triangle,
-                                std::uint32_t groups, const HidingOptions& options = {},
-                                const Progress& progress = {});
-
 /// Whether the whole group is hidden from a camera. The definition, for one group; the culling
 /// method certified is the same for many. A camera within the group's circle is not.
-bool hides_group(const CertifiedRegions& regions, GroupIndex group, const Position& eye);
+bool hides_group(const CertifiedRegions& regions, std::uint32_t group, const Position& eye);
 
 /// Sectors for which the regions of groups with `triangles` in all take at most `bytes` a triangle.
 /// @return a multiple of 8, at least 8, at most 4096

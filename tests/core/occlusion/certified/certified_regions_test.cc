@@ -8,6 +8,7 @@
 #include <string>
 
 #include "core/culling/certified_culling.h"
+#include "core/occlusion/certified/certify_groups.h"
 #include "core/occlusion/squares.h"
 #include "core/sight/triangle_sight.h"
 #include "core/threads/parallel_for.h"
