@@ -13,6 +13,7 @@
 #include "core/error/error.h"
 #include "core/horizon/stewart.h"
 #include "core/occlusion/build_groups.h"
+#include "core/occlusion/certified/certify_groups.h"
 #include "core/raster/preview.h"
 #include "ingest/dem/dem.h"
 #include "ingest/footprints/footprints.h"
@@ -28,6 +29,9 @@ namespace scarp {
 namespace {
 
 constexpr char kTile[] = "0/0/0";
+
+/// What certified regions may take, bytes a triangle of the mesh.
+constexpr double kCertifiedBytes = 16;
 
 /// One build from options to a finished scene, a member function a stage.
 class Build {
@@ -45,6 +49,9 @@ class Build {
     stages_.run("mesh", [&](const Progress& p) { mesh(p); });
     stages_.run("horizons", [&](const Progress& p) { horizons(p); });
     stages_.run("groups", [&](const Progress& p) { groups(p); });
+    if (options_.horizon == "certified")
+      stages_.run("certify", [&](const Progress& p) { certify(p); });
+    stages_.run("write groups", [&](const Progress&) { write_group_file(); });
     stages_.run("layers", [&](const Progress& p) { layers(p); });
     stages_.run("preview", [&](const Progress&) { preview(); });
     finish();
@@ -110,6 +117,17 @@ class Build {
       if (options_.max_groups > 0) crystals.max_groups = options_.max_groups;
       groups_ = build_groups(mesh_.tin, horizon_, crystals, progress, &grouping_);
     }
+  }
+
+  void certify(const Progress& progress) {
+    HidingOptions hiding;
+    hiding.sectors =
+        sectors_within(kCertifiedBytes, mesh_.tin.triangles.size(), groups_.leaf_count);
+    groups_.certified =
+        certify_groups(mesh_.tin, groups_.group_of_triangle, groups_.leaf_count, hiding, progress);
+  }
+
+  void write_group_file() {
     write_groups(writer_.path_for(tile_file_name(kTile, "groups")), groups_, Existing::kRefuse);
     tile_.files.push_back(writer_.record(tile_file_name(kTile, "groups"), "groups"));
   }
@@ -194,7 +212,7 @@ class Build {
     scene.raster = {dem_.columns, dem_.rows, dem_.geotransform};
     scene.parameters = {{"sectors", std::int64_t{options_.sectors}},
                         {"subsectors", std::int64_t{options_.subsectors}},
-                        {"horizon", std::string("stewart")},
+                        {"horizon", options_.horizon},
                         {"growth", growth_name(options_.growth)},
                         {"group_triangles", std::int64_t{options_.group_triangles}},
                         {"min_group_triangles", std::int64_t{options_.min_group_triangles}},

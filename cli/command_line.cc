@@ -63,6 +63,10 @@ void add_build(CLI::App& app, BuildOptions& o, std::function<int()>& run) {
   c->add_option("--footprints", o.footprints_file, "Building polygons, any source that OGR reads");
   c->add_option("--height-field", o.footprints_height_field,
                 "Field of --footprints with heights above ground, metres; height unless given");
+  c->add_option("--horizon", o.horizon,
+                "stewart: horizons of vertices, fast, may cull what is visible; certified: regions "
+                "that never do, besides; stewart unless given")
+      ->check(CLI::IsMember({"stewart", "certified"}));
   c->add_option("--sectors", o.sectors, "Directions that horizons are kept for; 16 unless given")
       ->check(CLI::Range(4, 1024));
   c->add_option("--subsectors", o.subsectors,
@@ -210,6 +214,9 @@ void add_cull(CLI::App& app, CullOptions& o, std::function<int()>& run) {
        "X,Y[,H]: H metres above ground, or as 1200asl")
       ->required();
   c->add_option("--crs", o.crs, "CRS of --camera, such as OGC:CRS84; the scene's unless given");
+  c->add_option("--method", o.method,
+                "thesis or certified; certified unless given where the scene was built with it")
+      ->check(CLI::IsMember({"thesis", "certified"}));
   auto* azimuth = c->add_option("--azimuth", o.azimuth_deg,
                                 "Direction of view, degrees clockwise from true north (from grid "
                                 "north without a CRS); all around unless given");

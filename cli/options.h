@@ -40,6 +40,7 @@ struct BuildOptions {
   std::optional<std::uint32_t> vertices;
   std::string footprints_file;
   std::string footprints_height_field = "height";
+  std::string horizon = "stewart";  ///< or "certified": that, and certified regions
   int sectors = 16;
   int subsectors = 4;
   Growth growth = Growth::kHiddenTogether;
@@ -96,6 +97,7 @@ struct CullOptions {
   CommonOptions common;
   std::string scene;
   TypedPosition camera;
+  std::string method;  ///< empty: certified where the scene has it, or thesis
   std::string crs;
   std::optional<double> azimuth_deg;  ///< of the view's middle; none: all around
   double field_of_view_deg = 90;

@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
 #include "cli/loaded_scene.h"
 #include "cli/progress_bar.h"
+#include "core/culling/certified_culling.h"
 #include "core/culling/visible_groups.h"
 #include "core/error/error.h"
 #include "core/occlusion/splitmix64.h"
@@ -31,13 +33,12 @@ MapPoint random_ground(const LoadedScene& scene, const GeoFrame::Placer& placer,
   }
 }
 
-/// Adds one eye's counts.
-void judge_eye(const LoadedScene& scene, const Position& eye, VerifyCounts& counts) {
-  const std::vector<TriangleSight> sight = judge_all(scene.index, eye);
-  const std::vector<std::uint8_t> culled =
-      culled_triangles(scene.groups, visible_groups(scene.groups, {eye, {}}));
-  std::vector<std::uint8_t> group_seen(scene.groups.leaf_count, 0);
-  const auto& group_of = scene.groups.group_of_triangle;
+/// Adds what a method makes of one eye, whose sight the judge has found.
+void count_eye(const Groups& groups, const std::vector<TriangleSight>& sight,
+               const CullingAnswer& answer, VerifyCounts& counts) {
+  const std::vector<std::uint8_t> culled = culled_triangles(groups, answer);
+  std::vector<std::uint8_t> group_seen(groups.leaf_count, 0);
+  const auto& group_of = groups.group_of_triangle;
   for (std::size_t t = 0; t < sight.size(); ++t)
     if (sight[t] != TriangleSight::kHidden && group_of[t] != kNone) group_seen[group_of[t]] = 1;
   for (std::size_t t = 0; t < sight.size(); ++t) {
@@ -57,21 +58,29 @@ std::vector<VerifyCounts> verify_scene(const LoadedScene& scene, int eyes,
                                        const std::vector<double>& heights_m, std::uint64_t seed,
                                        const Progress& progress) {
   const GeoFrame::Placer placer(scene.frame);
-  std::vector<VerifyCounts> all;
+  std::vector<std::unique_ptr<CullingMethod>> methods;
+  methods.push_back(std::make_unique<ThesisCulling>(scene.groups));
+  if (scene.groups.has_certified())
+    methods.push_back(std::make_unique<CertifiedCulling>(scene.groups.certified));
+  std::vector<VerifyCounts> all(methods.size() * heights_m.size());  // by method, then height
   double done = 0;
-  for (const double height_m : heights_m) {
-    VerifyCounts counts;
-    counts.method = "thesis";
-    counts.eye_height_m = height_m;
+  for (std::size_t h = 0; h < heights_m.size(); ++h) {
+    for (std::size_t m = 0; m < methods.size(); ++m) {
+      all[m * heights_m.size() + h].method = methods[m]->name();
+      all[m * heights_m.size() + h].eye_height_m = heights_m[h];
+    }
     SplitMix64 random(seed);  // the same places at every height
     for (int i = 0; i < eyes; ++i) {
       MapPoint at = random_ground(scene, placer, random);
-      at.height_m += height_m;
-      judge_eye(scene, placer.place(at), counts);
+      at.height_m += heights_m[h];
+      const Position eye = placer.place(at);
+      const std::vector<TriangleSight> sight = judge_all(scene.index, eye);
+      for (std::size_t m = 0; m < methods.size(); ++m)
+        count_eye(scene.groups, sight, methods[m]->visible({eye, {}}),
+                  all[m * heights_m.size() + h]);
       if (progress)
         progress(++done / static_cast<double>(eyes) / static_cast<double>(heights_m.size()));
     }
-    all.push_back(counts);
   }
   return all;
 }

@@ -49,7 +49,7 @@ nlohmann::json build_report(const BuildOptions& options, const Dem& dem, const M
       {"height_unit", dem.height_unit},
       {"sectors", options.sectors},
       {"subsectors", options.subsectors},
-      {"horizon", "stewart"},
+      {"horizon", options.horizon},
       {"growth", growth_name(options.growth)},
       {"group_triangles", options.group_triangles},
       {"min_group_triangles", options.min_group_triangles},
@@ -68,6 +68,12 @@ nlohmann::json build_report(const BuildOptions& options, const Dem& dem, const M
                       {"orphans", grouping.orphans},
                       {"passes", grouping.passes},
                       {"triangles_of_a_group", group_sizes(groups)}};
+  if (groups.has_certified()) {
+    const CertifiedRegions& regions = groups.certified;
+    report["certified"] = {{"sectors", regions.layout.sectors},
+                           {"bytes", regions.groups.size() * sizeof(CertifiedGroup) +
+                                         regions.steps.size() * sizeof(SectorSteps)}};
+  }
   for (const StageCost& stage : stages)
     report["stages"].push_back({{"name", stage.name},
                                 {"seconds", stage.seconds},

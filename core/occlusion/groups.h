@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/horizon/sectors.h"
+#include "core/occlusion/certified/certified_regions.h"
 #include "core/terrain/tin.h"
 
 namespace scarp {
@@ -57,6 +58,10 @@ struct Groups {
   std::uint32_t leaf_count = 0;
   std::vector<GroupNode> nodes;
   Regions regions;
+  /// Of the leaves; none where the scene was built without.
+  CertifiedRegions certified;
+
+  bool has_certified() const { return leaf_count > 0 && certified.groups.size() == leaf_count; }
 };
 
 }  // namespace scarp

@@ -24,6 +24,47 @@ struct NodeCircle {
   double centre_x_m, centre_y_m, radius_m;
 };
 
+/// A CertifiedGroup in two arrays without padding.
+struct CertifiedPlace {
+  double centre_x_m, centre_y_m, height_m;
+};
+struct CertifiedScale {
+  float radius_m, low_slope, slope_step;
+};
+
+void add_certified(SectionFileWriter& writer, const CertifiedRegions& regions) {
+  std::vector<CertifiedPlace> places;
+  std::vector<CertifiedScale> scales;
+  for (const CertifiedGroup& g : regions.groups) {
+    places.push_back({g.centre_x_m, g.centre_y_m, g.height_m});
+    scales.push_back({g.radius_m, g.low_slope, g.slope_step});
+  }
+  const std::vector<std::int32_t> layout = {regions.layout.sectors, regions.layout.ring_bits};
+  writer.add_owned<std::int32_t>("cert_layout", layout);
+  writer.add_owned<double>("cert_place", places);
+  writer.add_owned<float>("cert_scale", scales);
+  writer.add<std::uint8_t>("cert_steps", std::span(regions.steps));
+}
+
+void read_certified(Groups& groups, const SectionFile& file) {
+  CertifiedRegions& regions = groups.certified;
+  const auto layout = file.section<std::int32_t>("cert_layout");
+  if (layout.size() != 2)
+    file.fail(fmt::format("{} numbers of a layout where 2 were expected", layout.size()));
+  regions.layout = {layout[0], layout[1]};
+  const auto places = file.copy<double, CertifiedPlace>("cert_place");
+  const auto scales = file.copy<float, CertifiedScale>("cert_scale");
+  if (places.size() != groups.leaf_count || scales.size() != places.size())
+    file.fail(fmt::format("{} places and {} scales of certified regions for {} groups",
+                          places.size(), scales.size(), groups.leaf_count));
+  for (std::size_t g = 0; g < places.size(); ++g)
+    regions.groups.push_back({places[g].centre_x_m, places[g].centre_y_m, places[g].height_m,
+                              scales[g].radius_m, scales[g].low_slope, scales[g].slope_step});
+  regions.steps = file.copy<std::uint8_t, SectorSteps>("cert_steps");
+  if (const auto broken = check_certified(regions))
+    file.fail(fmt::format("of the certified regions, {}", *broken));
+}
+
 std::size_t region_count(const Groups& groups) {
   return groups.nodes.size() * static_cast<std::size_t>(groups.regions.layout.count);
 }
@@ -118,6 +159,7 @@ SectionFileWriter groups_writer(const Groups& groups) {
   writer.add<std::uint32_t>("region_first", std::span(regions.first));
   writer.add<double>("region_point", std::span(regions.points));
   writer.add<double>("end_slope", std::span(regions.end_slope));
+  if (groups.has_certified()) add_certified(writer, groups.certified);
   return writer;
 }
 
@@ -141,6 +183,7 @@ Groups read_groups(const SectionFile& file) {
   check_nodes(groups, file);
   check_group_of_triangle(groups, file);
   check_regions(groups, file);
+  if (file.has("cert_layout")) read_certified(groups, file);
   return groups;
 }
 
