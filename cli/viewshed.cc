@@ -212,11 +212,11 @@ class ViewshedRun {
     } else {
       AnyEye alone(ground_.grid);
       alone.add(window_, sight_.span());
-      write_values(path, alone.sight(), i, i + 1);
+      write_values(path, alone.seen(), i, i + 1);
     }
   }
 
-  std::span<const Seen> seen() const { return any_ ? any_->sight() : sight_.span(); }
+  std::span<const Seen> seen() const { return any_ ? any_->seen() : sight_.span(); }
 
   void write() {
     if (least_) {
@@ -355,8 +355,9 @@ class ViewshedRun {
         return std::count(sight.begin(), sight.end(), value);
       };
       result["visible_samples"] = samples_with(Seen::kVisible);
-      result["hidden_samples"] = samples_with(Seen::kHidden);
       result["unknown_samples"] = samples_with(Seen::kUnknown);
+      result["hidden_samples"] = sight.size() - result["visible_samples"].get<std::size_t>() -
+                                 result["unknown_samples"].get<std::size_t>();
     }
     return result;
   }

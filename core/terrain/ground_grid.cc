@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/threads/for_each_target.h"
 #include "core/threads/parallel_for.h"
 
 namespace scarp {
@@ -42,6 +43,37 @@ double height_on_normal(const BlockPlacement& blocks, std::int32_t column, std::
   const double rise = z - blocks.value(BlockPlacement::kHeight, column, row);
   return rise / (blocks.value(BlockPlacement::kLift, column, row) -
                  rise * blocks.value(BlockPlacement::kFall, column, row));
+}
+
+/// Flattened heights of a run of samples in one block.
+SCARP_FOR_EACH_TARGET
+void place_heights(std::size_t count, const double* __restrict heights_m,
+                   const BlockPlacement::Along& height, const BlockPlacement::Along& lift,
+                   const BlockPlacement::Along& fall, double u, double du, double* __restrict z_m) {
+  const BlockPlacement::Along base = height, rate = lift, bend = fall;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double at = u + static_cast<double>(static_cast<std::int32_t>(i)) * du;
+    const double h = heights_m[i];
+    z_m[i] = base.at(at) + h * rate.at(at) / (1 + h * bend.at(at));
+  }
+}
+
+/// Known heights in lattice steps; others are left. @return false where one is out of reach
+SCARP_FOR_EACH_TARGET
+bool set_steps(std::size_t count, const double* __restrict z_m,
+               const std::uint8_t* __restrict known, std::int32_t* __restrict steps) {
+  constexpr double kMost = GroundGrid::kReachZ_m - 1;
+  std::int32_t beyond = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::int32_t given = known[i] != 0 ? 1 : 0;
+    const double above = z_m[i] < -kMost ? -kMost : z_m[i];
+    const double z = above > kMost ? kMost : above;
+    const auto step = static_cast<std::int32_t>(round_to_lattice(z) * (1 / kLatticeStepM));
+    const std::int32_t before = steps[i];
+    beyond |= given & (z != z_m[i] ? 1 : 0);
+    steps[i] = given != 0 ? step : before;
+  }
+  return beyond == 0;
 }
 
 }  // namespace
@@ -154,17 +186,9 @@ bool GroundGrid::set_heights(std::int32_t row, std::int32_t first_column,
          first_column + static_cast<std::int64_t>(heights_m.size()) <= columns_);
   std::int32_t* to = &steps_[index(0, row)] + first_column;
   const auto* blocks = std::get_if<BlockPlacement>(&placement_);
+  if (!blocks) return set_steps(heights_m.size(), heights_m.data(), known, to);
   bool within = true;
-  const auto set = [&](std::size_t i, double z) {
-    if (!known[i]) return;
-    const bool reached = std::abs(z) < kReachZ_m - 1;
-    within = within && reached;
-    if (reached) to[i] = static_cast<std::int32_t>(round_to_lattice(z) * (1 / kLatticeStepM));
-  };
-  if (!blocks) {
-    for (std::size_t i = 0; i < heights_m.size(); ++i) set(i, heights_m[i]);
-    return within;
-  }
+  std::vector<double> z_m(static_cast<std::size_t>(blocks->side));
   for (std::size_t i = 0; i < heights_m.size();) {
     const std::int32_t column = first_column + static_cast<std::int32_t>(i);
     const BlockPlacement::Along height(*blocks, BlockPlacement::kHeight, column, row),
@@ -172,12 +196,10 @@ bool GroundGrid::set_heights(std::int32_t row, std::int32_t first_column,
         fall(*blocks, BlockPlacement::kFall, column, row);
     const std::size_t end = std::min(
         heights_m.size(), i + static_cast<std::size_t>(blocks->side - column % blocks->side));
-    double u = blocks->local(column);
-    const double step = 2.0 / blocks->side;
-    for (; i < end; ++i, u += step) {
-      const double h = heights_m[i];
-      set(i, height.at(u) + h * lift.at(u) / (1 + h * fall.at(u)));
-    }
+    place_heights(end - i, heights_m.data() + i, height, lift, fall, blocks->local(column),
+                  2.0 / blocks->side, z_m.data());
+    within = set_steps(end - i, z_m.data(), known + i, to + i) && within;
+    i = end;
   }
   return within;
 }

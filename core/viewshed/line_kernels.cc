@@ -3,17 +3,18 @@
 #include <algorithm>
 #include <cmath>
 
-// Sanitizers and other processors get the plain version.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
-    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define SCARP_FOR_EACH_TARGET \
-  __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
-#else
-#define SCARP_FOR_EACH_TARGET
-#endif
+#include "core/threads/for_each_target.h"
 
 namespace scarp {
 namespace {
+
+/// By value, unlike std::max: the compiler makes vectors of these.
+inline float greater(float a, float b) {
+  return a < b ? b : a;
+}
+inline float lesser(float a, float b) {
+  return b < a ? b : a;
+}
 
 /// BlockPlacement::Along::at, written out so that loops over it become vectors.
 struct Quadratic {
@@ -35,13 +36,22 @@ struct Quadratic {
 SCARP_FOR_EACH_TARGET
 bool load_heights(const std::int32_t* steps, std::size_t stride, std::size_t count,
                   double* __restrict z_m, std::uint8_t* __restrict is_void) {
-  std::uint8_t any = 0;
+  std::int32_t any = 0;
+  if (stride == 1) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::int32_t step = steps[i];
+      any |= step == GroundGrid::kVoid ? 1 : 0;
+      z_m[i] = (step == GroundGrid::kVoid ? 0 : step) * kLatticeStepM;
+    }
+    for (std::size_t i = 0; i < count; ++i) is_void[i] = steps[i] == GroundGrid::kVoid ? 1 : 0;
+    return any != 0;
+  }
   for (std::size_t i = 0; i < count; ++i) {
     const std::int32_t step = steps[i * stride];
     const std::uint8_t missing = step == GroundGrid::kVoid;
     any |= missing;
     is_void[i] = missing;
-    z_m[i] = missing ? 0 : step * kLatticeStepM;
+    z_m[i] = (missing != 0 ? 0 : step) * kLatticeStepM;
   }
   return any != 0;
 }
@@ -85,15 +95,16 @@ bool take_picture(std::size_t count, const double* __restrict forwards,
                   const std::uint8_t* __restrict is_void, double eye_z_m, double low_tangent,
                   double bins_per_tangent, double least_forwards, float* __restrict t,
                   float* __restrict s) {
-  double nearest = 1e300;
+  std::int32_t near = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const double inverse = 1 / forwards[i];
-    nearest = forwards[i] < nearest ? forwards[i] : nearest;
+    near |= forwards[i] < least_forwards ? 1 : 0;
     t[i] = static_cast<float>((sideways[i] * inverse - low_tangent) * bins_per_tangent);
-    const auto slope = static_cast<float>((z_m[i] - eye_z_m) * inverse);
-    s[i] = is_void[i] ? kNoGround : slope;
+    s[i] = static_cast<float>((z_m[i] - eye_z_m) * inverse);
   }
-  return nearest >= least_forwards;
+  if (is_void != nullptr)
+    for (std::size_t i = 0; i < count; ++i) s[i] = is_void[i] != 0 ? kNoGround : s[i];
+  return near == 0;
 }
 
 SCARP_FOR_EACH_TARGET
@@ -104,31 +115,31 @@ void take_level_picture(std::size_t count, double forwards, const double* __rest
   const double inverse = 1 / forwards;
   for (std::size_t i = 0; i < count; ++i) {
     t[i] = static_cast<float>((sideways[i] * inverse - low_tangent) * bins_per_tangent);
-    const auto slope = static_cast<float>((z_m[i] - eye_z_m) * inverse);
-    s[i] = is_void[i] ? kNoGround : slope;
+    s[i] = static_cast<float>((z_m[i] - eye_z_m) * inverse);
   }
+  if (is_void != nullptr)
+    for (std::size_t i = 0; i < count; ++i) s[i] = is_void[i] != 0 ? kNoGround : s[i];
 }
 
 SCARP_FOR_EACH_TARGET
-float take_rises(std::size_t count, const float* __restrict t, const float* __restrict s,
-                 const std::uint8_t* __restrict is_void, float* __restrict rise,
-                 float* __restrict steep) {
-  if (count == 0) return kAnyGround;
+bool take_rises(std::size_t count, const float* __restrict t, const float* __restrict s,
+                const std::uint8_t* __restrict is_void, float least_spacing, float* __restrict rise,
+                float* __restrict steep) {
+  if (count == 0) return true;
   const std::size_t segments = count - 1;
   steep[segments] = rise[segments] = 0;
-  float closest = kAnyGround;
+  std::int32_t close = 0;
   for (std::size_t i = 0; i < segments; ++i) {
     rise[i] = std::abs(s[i + 1] - s[i]);
-    const float spacing = t[i + 1] - t[i];
-    closest = spacing < closest ? spacing : closest;
+    close |= t[i + 1] - t[i] < least_spacing ? 1 : 0;
   }
   if (is_void != nullptr)
     for (std::size_t i = 0; i < segments; ++i)
       if ((is_void[i] | is_void[i + 1]) != 0) rise[i] = 0;
   for (std::size_t i = 1; i < segments; ++i)
-    steep[i] = std::max(rise[i - 1], std::max(rise[i], rise[i + 1]));
-  if (segments > 0) steep[0] = std::max(rise[0], rise[1]);
-  return closest;
+    steep[i] = greater(rise[i - 1], greater(rise[i], rise[i + 1]));
+  if (segments > 0) steep[0] = greater(rise[0], rise[1]);
+  return close == 0;
 }
 
 SCARP_FOR_EACH_TARGET
@@ -146,7 +157,7 @@ bool near_even_places(std::size_t edges, std::size_t count, const float* __restr
     guess = guess > last - 1 ? last - 1 : guess;
     guess += (t[guess + 1] <= edge ? 1 : 0) - (t[guess] > edge ? 1 : 0);
     const float from = t[guess], to = t[guess + 1];
-    misses += from > edge || to <= edge ? 1 : 0;
+    misses |= (from > edge ? 1 : 0) | (to <= edge ? 1 : 0);
     place[e] = static_cast<float>(guess) + (edge - from) / (to - from);
   }
   return misses == 0;
@@ -186,37 +197,43 @@ void edge_bounds(std::size_t edges, const float* __restrict place, const float* 
 SCARP_FOR_EACH_TARGET
 bool bin_bounds(std::size_t bins, const float* __restrict place,
                 const float* __restrict place_before, float slack, const float* __restrict higher,
-                const std::int32_t* __restrict before, const float* __restrict this_s,
-                const float* __restrict next_s, const float* __restrict edge_low,
-                const float* __restrict edge_high, float* __restrict up, float* __restrict low,
-                float* __restrict high) {
-  std::int32_t most = 0;
+                const float* __restrict higher_of_two, const std::int32_t* __restrict before,
+                const float* __restrict this_s, const float* __restrict next_s,
+                const float* __restrict edge_low, const float* __restrict edge_high,
+                float* __restrict up, float* __restrict low, float* __restrict high) {
+  std::int32_t many = 0;
   for (std::size_t b = 0; b < bins; ++b) {
     // Segments that touch the bin: from the first sample that is past its lower edge on either
     // line to the last that is not past its upper edge.
-    const float begin = std::min(place[b], place_before[b]) - slack;
-    const float end = std::max(place[b + 1], place_before[b + 1]) + slack;
+    const float begin = lesser(place[b], place_before[b]) - slack;
+    const float end = greater(place[b + 1], place_before[b + 1]) + slack;
     const std::int32_t first = static_cast<std::int32_t>(begin) + 1;
     const auto last = static_cast<std::int32_t>(end);
-    const std::int32_t middle = first + 1 < last ? first + 1 : last;
-    most = last - first > most ? last - first : most;
-    const float ends = std::max(edge_high[b], edge_high[b + 1]);
-    const float between = std::max(std::max(higher[first], higher[last]), higher[middle]);
-    const float upper = last >= first ? std::max(ends, between) : ends;
+    many |= last - first > 2 ? 1 : 0;
+    const float ends = greater(edge_high[b], edge_high[b + 1]);
+    const float pair = greater(higher_of_two[first], higher[last]);
+    const float between = last > first ? pair : higher[last];
+    const float upper = last >= first ? greater(ends, between) : ends;
     // Where a sample lies in the bin, the line may dip to it.
-    const float edge = std::min(edge_low[b], edge_low[b + 1]);
-    const float dip = std::min(edge, std::min(next_s[b], this_s[b + 1]));
+    const float edge = lesser(edge_low[b], edge_low[b + 1]);
+    const float dip = lesser(edge, lesser(next_s[b], this_s[b + 1]));
     const float lower = before[b + 1] > before[b] ? dip : edge;
     up[b] = upper;
-    low[b] = std::max(low[b], lower);
-    high[b] = std::max(high[b], upper);
+    low[b] = greater(low[b], lower);
+    high[b] = greater(high[b], upper);
   }
-  return most <= 2;
+  return many == 0;
+}
+
+SCARP_FOR_EACH_TARGET
+void take_pairs(std::size_t count, const float* __restrict values, float* __restrict pairs) {
+  for (std::size_t i = 0; i + 1 < count; ++i) pairs[i] = greater(values[i], values[i + 1]);
+  if (count > 0) pairs[count - 1] = values[count - 1];
 }
 
 SCARP_FOR_EACH_TARGET
 void take_maximum(std::size_t count, const float* __restrict values, float* __restrict into) {
-  for (std::size_t i = 0; i < count; ++i) into[i] = std::max(into[i], values[i]);
+  for (std::size_t i = 0; i < count; ++i) into[i] = greater(into[i], values[i]);
 }
 
 SCARP_FOR_EACH_TARGET
@@ -226,7 +243,7 @@ void classify(std::size_t count, const float* __restrict t, const float* __restr
   auto* to = reinterpret_cast<std::uint8_t*>(decision);
   for (std::size_t i = 0; i < count; ++i) {
     // Beyond the part's ends by rounding only; what is farther is nobody's target here.
-    const float within = std::min(std::max(t[i], 0.0F), static_cast<float>(bins));
+    const float within = lesser(greater(t[i], 0.0F), static_cast<float>(bins));
     const std::int32_t floor = static_cast<std::int32_t>(within);
     const std::int32_t bin = floor < bins ? floor : bins - 1;
     const float margin = slope_margin * std::abs(s[i]);

@@ -36,6 +36,7 @@ void raise_run(const BlockPlacement::Block& block, double u, double du, double v
                std::size_t count, const double* z_m, double height_m, double* raised_m);
 
 /// The picture of samples: t in bins, s, from places in front of the eye.
+/// @param is_void  null where none is
 /// @return false where a sample is not in front by at least least_forwards
 bool take_picture(std::size_t count, const double* forwards, const double* sideways,
                   const double* z_m, const std::uint8_t* is_void, double eye_z_m,
@@ -50,9 +51,9 @@ void take_level_picture(std::size_t count, double forwards, const double* sidewa
 /// Rises of s along a polyline: rise[i] of the segment after i, 0 where it has a void end; steep[i]
 /// the greatest of that one and its two neighbours.
 /// @param is_void  null where none is
-/// @return the least distance of neighbours in t
-float take_rises(std::size_t count, const float* t, const float* s, const std::uint8_t* is_void,
-                 float* rise, float* steep);
+/// @return whether neighbours are least_spacing apart in t, all of them
+bool take_rises(std::size_t count, const float* t, const float* s, const std::uint8_t* is_void,
+                float least_spacing, float* rise, float* steep);
 
 /// Where bins' edges fall among samples that are nearly even: place[e] is the sample before edge e,
 /// and how far the edge is towards the next. @return false where a first guess misses by more than
@@ -76,12 +77,16 @@ void edge_bounds(std::size_t edges, const float* place, const float* s, const fl
 /// @param place, place_before  [bins + 1] of the edges on this polyline and on the one before,
 ///                             both counted in samples of this one
 /// @param higher               the higher end of each segment that leads here, by sample
+/// @param higher_of_two        take_pairs of it
 /// @param up[out]              [bins] upper bound of what this line and its segments reach
 /// @return false where a bin has more than three segments; nothing holds then
 bool bin_bounds(std::size_t bins, const float* place, const float* place_before, float slack,
-                const float* higher, const std::int32_t* before, const float* this_s,
-                const float* next_s, const float* edge_low, const float* edge_high, float* up,
-                float* low, float* high);
+                const float* higher, const float* higher_of_two, const std::int32_t* before,
+                const float* this_s, const float* next_s, const float* edge_low,
+                const float* edge_high, float* up, float* low, float* high);
+
+/// pairs[i] = max(values[i], values[i + 1]); the last is alone.
+void take_pairs(std::size_t count, const float* values, float* pairs);
 
 /// For each bin the greater of two values.
 void take_maximum(std::size_t count, const float* values, float* into);

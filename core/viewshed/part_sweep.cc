@@ -273,7 +273,7 @@ class PartSweep::Run {
   // Room for one line.
   std::vector<double> across_, down_, raised_m_;
   std::vector<float> rises_;
-  std::vector<float> place_before_, higher_, target_t_, target_s_;
+  std::vector<float> place_before_, higher_, pairs_, target_t_, target_s_;
   std::vector<float> this_s_, next_s_, edge_low_, edge_high_, line_low_;
   std::vector<std::int32_t> edge_before_;
   std::vector<Decision> decisions_;
@@ -499,13 +499,14 @@ void PartSweep::Run::for_blocks(std::int32_t line, std::int32_t first, std::size
 void PartSweep::Run::take_pictures(const Line& line, const double* z_m, float* t, float* s) {
   const std::size_t count = line.z_m.size();
   const double eye_z_m = sight_.eye().z_m;
+  const std::uint8_t* is_void = line.has_void ? line.is_void.data() : nullptr;
   if (!ground_.across_of_column.empty()) {
     const auto& along = over_columns_ ? ground_.down_of_row : ground_.across_of_column;
     const auto& outwards = over_columns_ ? ground_.across_of_column : ground_.down_of_row;
     const double forwards = outwards_ * outwards[static_cast<std::size_t>(line.number)];
     if (!(forwards > kNearCells / 2)) bounds_hold_ = false;
-    take_level_picture(count, forwards, &along[static_cast<std::size_t>(line.first)], z_m,
-                       line.is_void.data(), eye_z_m, low_tangent_, bins_per_tangent(), t, s);
+    take_level_picture(count, forwards, &along[static_cast<std::size_t>(line.first)], z_m, is_void,
+                       eye_z_m, low_tangent_, bins_per_tangent(), t, s);
     return;
   }
   across_.resize(count);
@@ -527,8 +528,7 @@ void PartSweep::Run::take_pictures(const Line& line, const double* z_m, float* t
   if (outwards_ < 0)
     for (double& f : forwards) f = -f;
   if (!take_picture(count, forwards.data(), over_columns_ ? down_.data() : across_.data(), z_m,
-                    line.is_void.data(), eye_z_m, low_tangent_, bins_per_tangent(), kNearCells / 2,
-                    t, s))
+                    is_void, eye_z_m, low_tangent_, bins_per_tangent(), kNearCells / 2, t, s))
     bounds_hold_ = false;
 }
 
@@ -577,8 +577,8 @@ void PartSweep::Run::fill(Line& to, std::int32_t line) {
   const auto n = to.t.size();
   to.steep.resize(n);
   rises_.resize(n);
-  if (take_rises(n, to.t.data(), to.s.data(), to.has_void ? to.is_void.data() : nullptr,
-                 rises_.data(), to.steep.data()) < kLeastSpacingBins)
+  if (!take_rises(n, to.t.data(), to.s.data(), to.has_void ? to.is_void.data() : nullptr,
+                  kLeastSpacingBins, rises_.data(), to.steep.data()))
     bounds_hold_ = false;
   to.is_whole =
       bounds_hold_ && !to.has_void && n > 4 && to.t[1] < -slack() && to.t[n - 2] > bins + slack();
@@ -847,12 +847,14 @@ void PartSweep::Run::add_whole(const Line& line, const Line* before) {
       return;
     }
   }
+  pairs_.resize(n);
+  take_pairs(n, higher, pairs_.data());
   // A bin's slack in samples: they are kLeastSpacingBins apart or more.
   const float place_slack = 4 * slack();
   float* up = history_.begin_line(line.number, bins_);
-  if (!bin_bounds(bins, line.place.data(), place_before, place_slack, higher, edge_before_.data(),
-                  this_s_.data(), next_s_.data(), edge_low_.data(), edge_high_.data(), up,
-                  low_.data(), high_.data()))
+  if (!bin_bounds(bins, line.place.data(), place_before, place_slack, higher, pairs_.data(),
+                  edge_before_.data(), this_s_.data(), next_s_.data(), edge_low_.data(),
+                  edge_high_.data(), up, low_.data(), high_.data()))
     bounds_hold_ = false;
   history_.end_line();
 }

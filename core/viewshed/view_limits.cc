@@ -88,7 +88,8 @@ bool within(const ViewLimits& limits, const Bearing& bearing) {
     return false;
   if (bearing.pitch_rad < limits.min_pitch_rad || bearing.pitch_rad > limits.max_pitch_rad)
     return false;
-  if (!limits.azimuth_begin_rad) return true;
+  // What is under the eye has no azimuth.
+  if (!limits.azimuth_begin_rad || bearing.distance_m == 0) return true;
   const double begin = *limits.azimuth_begin_rad, end = *limits.azimuth_end_rad;
   const double at = bearing.azimuth_rad;
   return begin <= end ? at >= begin && at <= end : at >= begin || at <= end;

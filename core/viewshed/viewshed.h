@@ -44,7 +44,7 @@ class AnyEye {
   /// Nothing seen yet: hidden, and unknown where void.
   explicit AnyEye(const GroundGrid& grid);
   void add(const SampleWindow& window, std::span<const Seen> sight);
-  std::span<const Seen> sight() const { return sight_; }
+  std::span<const Seen> seen() const { return sight_; }
 
  private:
   std::size_t columns_;

@@ -13,6 +13,7 @@
 #include <span>
 
 #include "core/error/error.h"
+#include "core/threads/for_each_target.h"
 #include "core/threads/parallel_for.h"
 #include "ingest/dem/gdal_session.h"
 #include "ingest/dem/ground_placement.h"
@@ -189,6 +190,26 @@ HeightUnit height_unit_of(const Source& source, const DemOptions& options) {
   return kMetre;
 }
 
+/// (value * scale + offset) * metres in place, if all known ones come to lie between low and high
+/// then; otherwise nothing. @return whether they did
+SCARP_FOR_EACH_TARGET
+bool convert_to_metres(std::size_t count, const std::uint8_t* __restrict known, double scale,
+                       double offset, double metres, double low_m, double high_m,
+                       double* __restrict values) {
+  std::int32_t wrong = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double height_m = (values[i] * scale + offset) * metres;
+    const std::int32_t right = (height_m >= low_m ? 1 : 0) & (height_m <= high_m ? 1 : 0);
+    wrong |= (known[i] != 0 ? 1 : 0) & (right ^ 1);
+  }
+  if (wrong != 0) return false;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double height_m = (values[i] * scale + offset) * metres;
+    values[i] = known[i] != 0 ? height_m : 0;
+  }
+  return true;
+}
+
 /// Reads one file into its place; heights leave here in metres.
 class HeightReader {
  public:
@@ -254,10 +275,12 @@ class HeightReader {
       for (int r = 0; r < count; ++r) {
         const std::span<double> heights_m(&values[static_cast<std::size_t>(r) * width], width);
         std::uint8_t* known = &mask[static_cast<std::size_t>(r) * width];
-        for (std::size_t c = 0; c < width; ++c) {
-          if (options_.nodata && heights_m[c] == *options_.nodata) known[c] = 0;
-          if (known[c]) heights_m[c] = metres(heights_m[c], c, row + r);
-        }
+        if (options_.nodata)
+          for (std::size_t c = 0; c < width; ++c)
+            if (heights_m[c] == *options_.nodata) known[c] = 0;
+        if (!convert(heights_m, known))
+          for (std::size_t c = 0; c < width; ++c)
+            if (known[c]) metres(heights_m[c], c, row + r);  // refuses the first that is wrong
         put(source_.south_up ? source_.rows - 1 - (row + r) : row + r, heights_m, known);
         if (!has_mask_) std::fill(known, known + width, std::uint8_t{255});
       }
@@ -280,6 +303,15 @@ class HeightReader {
       refuse(source_.file, fmt::format("cannot be read at row {} of {} ({}); the whole raster was "
                                        "expected; is the file complete?",
                                        row, source_.rows, reason));
+  }
+
+  /// Known values to metres, all of a row; where one is no height, nothing is done.
+  /// @return whether all are heights
+  bool convert(std::span<double> values, const std::uint8_t* known) const {
+    const double low_m = on_earth_ ? kLowestGroundM : -kLatticeReachM;
+    const double high_m = on_earth_ ? kHighestGroundM : kLatticeReachM;
+    return convert_to_metres(values.size(), known, scale_, offset_, unit_.metres, low_m, high_m,
+                             values.data());
   }
 
   double metres(double value, std::size_t column, int row) const {

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstring>
 #include <memory>
+#include <utility>
 
 #include "core/error/error.h"
 #include "ingest/dem/gdal_session.h"
@@ -85,6 +86,15 @@ class Attributes {
     return value;
   }
 
+  std::optional<std::pair<double, double>> place() const {
+    for (const auto& [x_name, y_name] :
+         {std::pair("x", "y"), {"lon", "lat"}, {"longitude", "latitude"}}) {
+      const auto x = number(x_name), y = number(y_name);
+      if (x && y) return std::pair(*x, *y);
+    }
+    return {};
+  }
+
   std::string text(const char* name) const {
     const int field = feature_.GetFieldIndex(name);
     return field >= 0 && feature_.IsFieldSetAndNotNull(field) ? feature_.GetFieldAsString(field)
@@ -137,7 +147,12 @@ std::vector<ObserverRecord> read_observers(const std::string& file, const std::s
   for (OGRLayer* layer : dataset->GetLayers()) {
     const TransformationPtr conversion = conversion_of(*layer, file, data_crs_wkt, crs);
     for (const auto& feature : layer) {
+      const Attributes attributes(*feature, file);
+      const auto typed = attributes.place();
+      const OGRPoint from_table(typed ? typed->first : 0, typed ? typed->second : 0);
+      // Tables without geometry have columns x and y, or lon and lat.
       const OGRGeometry* geometry = feature->GetGeometryRef();
+      if (!geometry && typed) geometry = &from_table;
       if (!geometry || wkbFlatten(geometry->getGeometryType()) != wkbPoint || geometry->IsEmpty())
         refuse(file,
                fmt::format("feature {}: has no point; points were expected", feature->GetFID()));
@@ -151,7 +166,7 @@ std::vector<ObserverRecord> read_observers(const std::string& file, const std::s
                                    "the DEM; is its own declared right?",
                                    feature->GetFID()));
       }
-      records.push_back(record_of(Attributes(*feature, file), point));
+      records.push_back(record_of(attributes, point));
       check(records.back(), file, feature->GetFID());
     }
   }

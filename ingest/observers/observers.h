@@ -20,7 +20,8 @@ struct ObserverRecord {
   std::optional<double> pitch_lowest_deg, pitch_highest_deg;  ///< "pitch_low", "pitch_high"
 };
 
-/// Reads the points of every layer of a file that OGR reads, in order. Attributes are found by
+/// Reads the points of every layer of a file that OGR reads, in order; of tables without geometry
+/// the columns x and y, lon and lat, or longitude and latitude. Attributes are found by
 /// the names above, in any case; "radius" is another name of max_distance. A height of the
 /// geometry itself is not used.
 /// @param data_crs_wkt  what points are converted to; empty: they are taken as they are

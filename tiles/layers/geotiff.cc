@@ -5,7 +5,9 @@
 #include <gdal_priv.h>
 #include <ogr_spatialref.h>
 
+#include <algorithm>
 #include <cassert>
+#include <vector>
 
 #include "core/error/error.h"
 #include "core/threads/parallel_for.h"
@@ -52,6 +54,19 @@ GDALDatasetUniquePtr memory_dataset(const RasterLayer& layer, const LayerData& d
   return dataset;
 }
 
+/// Halved pictures until one fits into a tile. In memory: the driver would make them by itself, but
+/// as a compressed file of its own, which takes longer than all the rest.
+void build_overviews(GDALDataset& source, const LayerData& data) {
+  constexpr int kTile = 512;
+  std::vector<int> factors;
+  for (int factor = 2;
+       std::max(source.GetRasterXSize(), source.GetRasterYSize()) > kTile * factor / 2; factor *= 2)
+    factors.push_back(factor);
+  if (!factors.empty())
+    source.BuildOverviews(data.is_float ? "AVERAGE" : "NEAREST", static_cast<int>(factors.size()),
+                          factors.data(), 0, nullptr, nullptr, nullptr);
+}
+
 void describe(GDALDataset& dataset, const RasterLayer& layer) {
   std::array<double, 6> geotransform = layer.geotransform;
   dataset.SetGeoTransform(geotransform.data());
@@ -88,6 +103,8 @@ void write_geotiff_cog(const std::string& path, const RasterLayer& layer, Existi
     const OGRSpatialReference crs = spatial_reference(layer.crs_wkt, path);
     source->SetSpatialRef(&crs);
   }
+  build_overviews(*source, data);
+  session.check(path);
   CPLStringList options;
   options.SetNameValue("COMPRESS", "DEFLATE");
   options.SetNameValue("PREDICTOR", data.predictor);

@@ -112,7 +112,7 @@ TEST(SweepViewshed, EqualsTheJudgeOnEveryCell) {
       recipe.rows = size - 7;
       const GroundGrid grid = random_ground(recipe);
       std::mt19937 random(recipe.seed);
-      for (const Position& eye : eyes_for(grid, random, size < 50 ? 24 : 6)) {
+      for (const Position& eye : eyes_for(grid, random, size < 50 ? 14 : 3)) {
         for (const double target_m : {0.0, 3.0}) {
           const auto expected = judged(grid, eye, target_m), found = swept(grid, eye, target_m);
           for (std::size_t i = 0; i < expected.size(); ++i)

@@ -1,0 +1,141 @@
+#include <gdal_priv.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "tests/support/run_scarp.h"
+#include "tests/support/temp_folder.h"
+
+namespace scarp {
+namespace {
+
+using nlohmann::json;
+using test::run_scarp;
+using test::RunResult;
+
+/// A plain of 100 m cells with a wall of 40 m and, in its last row, void.
+class ViewshedCommand : public testing::Test {
+ protected:
+  static constexpr int kColumns = 12, kRows = 6;
+
+  void SetUp() override {
+    GDALAllRegister();
+    dem_ = folder_.path("dem.tif");
+    GDALDataset* dataset = GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
+        dem_.c_str(), kColumns, kRows, 1, GDT_Float32, nullptr);
+    double transform[6] = {500'000, 100, 0, 4'000'000, 0, -100};
+    dataset->SetGeoTransform(transform);
+    OGRSpatialReference crs;
+    crs.SetFromUserInput("EPSG:32611");
+    dataset->SetSpatialRef(&crs);
+    std::vector<float> heights(kColumns * kRows, 10);
+    for (int r = 0; r < kRows; ++r) heights[static_cast<std::size_t>(r * kColumns + 5)] = 50;
+    for (int c = 0; c < kColumns; ++c) heights[static_cast<std::size_t>(5 * kColumns + c)] = -99;
+    dataset->GetRasterBand(1)->SetNoDataValue(-99);
+    EXPECT_EQ(dataset->GetRasterBand(1)->RasterIO(GF_Write, 0, 0, kColumns, kRows, heights.data(),
+                                                  kColumns, kRows, GDT_Float32, 0, 0),
+              CE_None);
+    GDALClose(dataset);
+  }
+
+  RunResult view(const std::string& options, const std::string& output = "out.tif") {
+    return run_scarp("$SCARP viewshed " + dem_ + " -o " + folder_.path(output) + " " + options);
+  }
+  std::vector<double> read(const std::string& output = "out.tif") {
+    const GDALDatasetUniquePtr dataset(
+        GDALDataset::Open(folder_.path(output).c_str(), GDAL_OF_RASTER));
+    std::vector<double> values(kColumns * kRows);
+    EXPECT_EQ(dataset->GetRasterBand(1)->RasterIO(GF_Read, 0, 0, kColumns, kRows, values.data(),
+                                                  kColumns, kRows, GDT_Float64, 0, 0),
+              CE_None);
+    return values;
+  }
+
+  const test::TempFolder folder_;
+  std::string dem_;
+};
+
+/// Centre of the second cell of the second row, 2 m over ground.
+constexpr char kEye[] = "--observer 500150,3999850";
+
+TEST_F(ViewshedCommand, WritesWhatIsSeenAndSaysHow) {
+  const RunResult result = view(std::string(kEye) + " --json");
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  const json report = json::parse(result.output);
+  EXPECT_EQ(report["visible_samples"], 30);
+  EXPECT_EQ(report["hidden_samples"], 30);
+  EXPECT_EQ(report["unknown_samples"], 12);
+  const std::vector<double> values = read();
+  EXPECT_EQ(values[0], 1);
+  EXPECT_EQ(values[5], 1);
+  EXPECT_EQ(values[6], 0);
+  EXPECT_EQ(values[kColumns * 5], 255);
+  const GDALDatasetUniquePtr out(
+      GDALDataset::Open(folder_.path("out.tif").c_str(), GDAL_OF_RASTER));
+  EXPECT_STREQ(out->GetMetadataItem("SURFACE"), "grid");
+  EXPECT_STREQ(out->GetMetadataItem("EARTH"), "ellipsoid");
+  EXPECT_STREQ(out->GetMetadataItem("LAYOUT", "IMAGE_STRUCTURE"), "COG");
+  EXPECT_NE(out->GetRasterBand(1)->GetColorTable(), nullptr);
+}
+
+TEST_F(ViewshedCommand, ModesOfSeveralEyes) {
+  const std::string eyes = std::string(kEye) + " --observer 501150,3999850,3";
+  ASSERT_EQ(view(eyes + " --mode count").exit_code, 0);
+  EXPECT_EQ(read()[0], 1);
+  EXPECT_EQ(read()[5], 2);
+  EXPECT_EQ(read()[kColumns * 5], 4294967295.0);
+  ASSERT_EQ(view(eyes + " --mode visible --overwrite").exit_code, 0);
+  EXPECT_EQ(read()[11], 1);
+  ASSERT_EQ(view(std::string(kEye) + " --mode ground --earth flat --overwrite").exit_code, 0);
+  // The line over the wall rises by 38 m in 400 m: after another 100 m it is at 47.5 m.
+  EXPECT_NEAR(read()[kColumns + 6], 49.5, 0.01);
+  EXPECT_EQ(read()[0], 0);
+  EXPECT_TRUE(std::isnan(read()[kColumns * 5]));
+  ASSERT_EQ(view(std::string(kEye) + " --mode dem --earth flat --overwrite").exit_code, 0);
+  EXPECT_NEAR(read()[kColumns + 6], 59.5, 0.01);
+  ASSERT_EQ(view(std::string(kEye) + " --gdal-values --overwrite").exit_code, 0);
+  EXPECT_EQ(read()[0], 255);
+}
+
+TEST_F(ViewshedCommand, EyesFromAFile) {
+  std::ofstream(folder_.path("eyes.csv"))
+      << "name,x,y,height,radius\nwest,500150,3999850,2,\neast/1,501150,3999850,2,250\n";
+  std::filesystem::create_directory(folder_.path("each"));
+  const RunResult result = view("--observers " + folder_.path("eyes.csv") +
+                                " --mode count --each " + folder_.path("each"));
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_EQ(read()[5], 1);  // 600 m from the eastern eye
+  EXPECT_EQ(read()[10], 1);
+  EXPECT_TRUE(std::filesystem::exists(folder_.path("each/west.tif")));
+  EXPECT_EQ(read("each/east_1.tif")[10], 1);
+  EXPECT_EQ(read("each/east_1.tif")[5], 0);
+}
+
+TEST_F(ViewshedCommand, RefusesInOneLineAndLeavesNothing) {
+  const auto refused = [&](const std::string& options, int code, const std::string& words) {
+    const RunResult result = view(options);
+    EXPECT_EQ(result.exit_code, code) << options;
+    EXPECT_NE(result.errors.find(words), std::string::npos) << result.errors;
+    EXPECT_EQ(std::count(result.errors.begin(), result.errors.end(), '\n'), 1) << result.errors;
+    EXPECT_FALSE(std::filesystem::exists(folder_.path("out.tif")));
+  };
+  refused("", 2, "--observer");
+  refused("--observer 1,2", 1, "outside the data");
+  refused("--observer 500150,3999450", 1, "void");
+  refused(std::string(kEye) + " --refraction 2", 1, "refraction");
+  refused(std::string(kEye) + " --pitch 5,3", 2, "lowest");
+  refused(std::string(kEye) + " --azimuth 5", 2, "--azimuth");
+  refused(std::string(kEye) + " --min-distance 50 --max-distance 20", 2, "--min-distance");
+  refused(std::string(kEye) + " --each " + folder_.path("nowhere"), 1, "folder");
+  refused("--observer 500150,3999450,1000asl --crs EPSG:0", 1, "EPSG:0");
+  EXPECT_EQ(view("--observer 500150,3999450,1000asl").exit_code, 0);
+  EXPECT_EQ(view(kEye).exit_code, 1);
+  EXPECT_EQ(view(std::string(kEye) + " --overwrite").exit_code, 0);
+}
+
+}  // namespace
+}  // namespace scarp
