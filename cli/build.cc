@@ -51,8 +51,10 @@ class Build {
     stages_.run("groups", [&](const Progress& p) { groups(p); });
     if (options_.horizon == "certified")
       stages_.run("certify", [&](const Progress& p) { certify(p); });
-    stages_.run("write groups", [&](const Progress&) { write_group_file(); });
-    stages_.run("layers", [&](const Progress& p) { layers(p); });
+    stages_.run("layers", [&](const Progress& p) {
+      write_group_file();
+      layers(p);
+    });
     stages_.run("preview", [&](const Progress&) { preview(); });
     finish();
     stages_.finish();

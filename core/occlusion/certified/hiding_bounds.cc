@@ -219,7 +219,7 @@ class Bounding {
     FanPlace centre;
     double radius_m, height_m;
     float* cells;   // of the group: [sectors * kRings]
-    RingRow floor;  // no camera stands lower: finer bounds are of no use
+    RingRow floor;  // no camera over the data is lower: bounds at or under it are given up
   };
 
   void look_along(const FanView& view, const Curtains& curtains, const RingTable& rings,
@@ -255,8 +255,6 @@ class Bounding {
           if (++sector == options_.sectors) sector = 0;
         }
       }
-    for (std::size_t k = 0; k < kRings; ++k)
-      if (goal[k] <= look.floor[k]) goal[k] = kNothing;
     return goal;
   }
 
@@ -266,7 +264,9 @@ class Bounding {
         std::int32_t sector = look.turns.first[lane][k];
         for (std::int32_t n = look.turns.count[lane][k]; n > 0; --n) {
           float& cell = look.cells[static_cast<std::size_t>(sector) * kRings + k];
-          cell = std::min(cell, row[k]);
+          // Bounds under all ground are not refined, so they must not stay: nothing is hidden
+          // there.
+          cell = std::min(cell, row[k] > look.floor[k] ? row[k] : kNothing);
           if (++sector == options_.sectors) sector = 0;
         }
       }

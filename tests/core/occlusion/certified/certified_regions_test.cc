@@ -237,6 +237,32 @@ TEST(CertifiedRegions, AWallHidesWhatIsBehindIt) {
     EXPECT_FALSE(hides_group(scene.regions, g, {50, 300, 5000}));
 }
 
+TEST(CertifiedRegions, ACameraUnderAllGroundOutsideTheDataSeesSlopesThatFallTowardsIt) {
+  // A rough roof: outside, between the lowest ground and the planes of its slopes, one looks up at
+  // it.
+  std::mt19937_64 random(5);
+  const SampleGrid grid = test::grid_of(32, 32, 10, [&](int c, int r) {
+    return 200 - 9.0 * std::abs(c - 15.5) - 0.5 * std::abs(r - 15.5) +
+           static_cast<double>(random() % 1024) / 128;
+  });
+  const Certified scene = certify(test::triangulated(grid), 4, few_fans());
+  const TinIndex index(scene.tin);
+  const double lowest_m = bounds_of(scene.tin.vertices).low.z_m;
+  std::size_t seen_count = 0;
+  for (const double x_m : {-20.0, -60.0, -150.0, -400.0, 330.0, 500.0, 900.0})
+    for (const double y_m : {-40.0, 20.0, 155.0, 300.0})
+      for (const double under_m : {0.5, 5.0, 20.0, 60.0, 150.0}) {
+        const Position eye = round_to_lattice(Position{x_m, y_m, lowest_m - under_m});
+        const std::vector<std::uint8_t> seen = seen_groups(scene, index, eye);
+        for (GroupIndex g = 0; g < scene.groups.count; ++g) {
+          seen_count += seen[g];
+          EXPECT_FALSE(seen[g] && hides_group(scene.regions, g, eye))
+              << "group " << g << " from " << x_m << " " << y_m << ", " << under_m << " m under";
+        }
+      }
+  EXPECT_GT(seen_count, 100U);
+}
+
 TEST(CertifiedRegions, VoidHidesNothing) {
   // The wall of above, but of nothing known.
   const SampleGrid grid =
