@@ -65,7 +65,7 @@ void add_build(CLI::App& app, BuildOptions& o, std::function<int()>& run) {
                 "Field of --footprints with heights above ground, metres; height unless given");
   c->add_option("--horizon", o.horizon,
                 "stewart: horizons of vertices, fast, may cull what is visible; certified: regions "
-                "that never do, besides; stewart unless given")
+                "made never to, besides (young, slow); stewart unless given")
       ->check(CLI::IsMember({"stewart", "certified"}));
   c->add_option("--sectors", o.sectors, "Directions that horizons are kept for; 16 unless given")
       ->check(CLI::Range(4, 1024));

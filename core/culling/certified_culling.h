@@ -12,7 +12,7 @@ namespace scarp {
 /// Side: what is left out is hidden, whole triangles and not only vertices. The view leaves out
 /// groups whose circle lies wholly beside it, rounded outwards. Keeps a reference to the regions,
 /// which must outlive it and hold what check_certified checks. Thread-safe.
-/// Cost: O(groups), about 10 ns each. Allocation: the answer.
+/// Cost: O(groups), one look-up each. Allocation: the answer.
 class CertifiedCulling : public CullingMethod {
  public:
   explicit CertifiedCulling(const CertifiedRegions& regions);
