@@ -9,7 +9,6 @@
 #include "cli/loaded_scene.h"
 #include "cli/picture_size.h"
 #include "cli/stages.h"
-#include "core/culling/visible_groups.h"
 #include "core/error/error.h"
 #include "core/horizon/stewart.h"
 #include "core/occlusion/build_groups.h"
@@ -28,8 +27,6 @@
 namespace scarp {
 namespace {
 
-constexpr char kTile[] = "0/0/0";
-
 /// What certified regions may take, bytes a triangle of the mesh.
 constexpr double kCertifiedBytes = 16;
 
@@ -40,7 +37,7 @@ class Build {
       : options_(options),
         stages_(!options.common.json),
         writer_(options.scene, options.common.overwrite ? Existing::kReplace : Existing::kRefuse) {
-    tile_.id = kTile;
+    tile_.id = kOnlyTile;
   }
 
   void run() {
@@ -77,9 +74,9 @@ class Build {
     mesh_ = mesh_with_walls(grid_, mesh_options_, walls(), progress);
     index_.emplace(mesh_.tin);
     heights_m_ = vertex_heights_m(mesh_.tin, *dem_.frame);
-    write_tin(writer_.path_for(tile_file_name(kTile, "tin")), mesh_.tin, mesh_.sample_of_vertex,
-              Existing::kRefuse);
-    tile_.files.push_back(writer_.record(tile_file_name(kTile, "tin"), "tin"));
+    add_tile_file("tin", [&](const std::string& path) {
+      write_tin(path, mesh_.tin, mesh_.sample_of_vertex, Existing::kRefuse);
+    });
   }
 
   /// The buildings of --footprints; their walls' feet follow the ground as closely as the mesh.
@@ -97,8 +94,9 @@ class Build {
   void horizons(const Progress& progress) {
     const SectorLayout layout{options_.sectors, options_.subsectors};
     horizon_ = stewart_horizons(mesh_.tin.vertices, layout, progress);
-    write_horizon(writer_.path_for(tile_file_name(kTile, "horizon")), horizon_, Existing::kRefuse);
-    tile_.files.push_back(writer_.record(tile_file_name(kTile, "horizon"), "horizon"));
+    add_tile_file("horizon", [&](const std::string& path) {
+      write_horizon(path, horizon_, Existing::kRefuse);
+    });
   }
 
   void groups(const Progress& progress) {
@@ -130,8 +128,8 @@ class Build {
   }
 
   void write_group_file() {
-    write_groups(writer_.path_for(tile_file_name(kTile, "groups")), groups_, Existing::kRefuse);
-    tile_.files.push_back(writer_.record(tile_file_name(kTile, "groups"), "groups"));
+    add_tile_file("groups",
+                  [&](const std::string& path) { write_groups(path, groups_, Existing::kRefuse); });
   }
 
   /// Where the eye of the viewshed layer stands: as typed, or over the highest sample.
@@ -230,6 +228,13 @@ class Build {
     scene.tiles.push_back(tile_);
     scene.layers = layers_;
     writer_.finish(scene);
+  }
+
+  template <class Write>
+  void add_tile_file(const std::string& kind, Write write) {
+    const std::string name = tile_file_name(kOnlyTile, kind);
+    write(writer_.path_for(name));
+    tile_.files.push_back(writer_.record(name, kind));
   }
 
   template <class Write>

@@ -49,17 +49,6 @@ std::optional<double> ground_height_m(const GroundGrid& grid, double column, dou
   return sum_m;
 }
 
-MapPoint converted(const TypedPosition& typed, const std::string& crs, const GeoFrame& frame) {
-  const MapPoint point{typed.x, typed.y, typed.height_m};
-  if (crs.empty()) return point;
-  if (frame.description().crs_wkt.empty())
-    throw Error(ErrorCode::kInput,
-                fmt::format("--crs {}: the data have no coordinate system to convert to; give "
-                            "positions in the units of the data and leave --crs out",
-                            crs));
-  return convert_coordinates(crs, frame.description().crs_wkt, point);
-}
-
 }  // namespace
 
 GroundEye place_eye(const MapPoint& map, const Ground& ground, const GeoFrame::Placer& placer) {
@@ -95,7 +84,8 @@ GroundEye place_eye(const MapPoint& point, bool above_datum, const std::string& 
 }
 
 GroundEye place_eye(const TypedPosition& typed, const std::string& crs, const Ground& ground) {
-  return place_eye(converted(typed, crs, *ground.dem.frame), typed.above_datum, typed.text, ground);
+  return place_eye(to_map_point(typed, crs, *ground.dem.frame), typed.above_datum, typed.text,
+                   ground);
 }
 
 }  // namespace scarp

@@ -10,12 +10,6 @@
 #include "tiles/store/tin_file.h"
 
 namespace scarp {
-namespace {
-
-constexpr char kOnlyTile[] = "0/0/0";
-
-}  // namespace
-
 FrameDescription frame_of(const SceneDescription& description) {
   FrameDescription frame;
   frame.crs_wkt = description.crs_wkt;
@@ -58,15 +52,7 @@ std::optional<double> ground_height_m(const GeoFrame::Placer& placer, const TinI
 
 MapPoint resolve(const TypedPosition& typed, const std::string& crs, const GeoFrame& frame,
                  const TinIndex& index) {
-  MapPoint point{typed.x, typed.y, typed.height_m};
-  if (!crs.empty()) {
-    if (frame.description().crs_wkt.empty())
-      throw Error(ErrorCode::kInput,
-                  fmt::format("--crs {}: the data have no coordinate system to convert to; give "
-                              "positions in the units of the data and leave --crs out",
-                              crs));
-    point = convert_coordinates(crs, frame.description().crs_wkt, point);
-  }
+  MapPoint point = to_map_point(typed, crs, frame);
   if (typed.above_datum) return point;
   const auto ground_m = ground_height_m(GeoFrame::Placer(frame), index, point.x, point.y);
   if (!ground_m)

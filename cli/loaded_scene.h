@@ -13,6 +13,9 @@
 
 namespace scarp {
 
+/// The one tile that a scene has today.
+inline constexpr char kOnlyTile[] = "0/0/0";
+
 /// A scene in memory, with all that commands ask of it.
 struct LoadedScene {
   explicit LoadedScene(const std::string& path);

@@ -83,6 +83,17 @@ double parse_frequency(const std::string& text) {
   return *value * factor;
 }
 
+MapPoint to_map_point(const TypedPosition& typed, const std::string& crs, const GeoFrame& frame) {
+  const MapPoint point{typed.x, typed.y, typed.height_m};
+  if (crs.empty()) return point;
+  if (frame.description().crs_wkt.empty())
+    throw Error(ErrorCode::kInput,
+                fmt::format("--crs {}: the data have no coordinate system to convert to; give "
+                            "positions in the units of the data and leave --crs out",
+                            crs));
+  return convert_coordinates(crs, frame.description().crs_wkt, point);
+}
+
 std::uint64_t parse_bytes(const std::string& text) {
   std::string_view rest = text;
   const auto value = take_number(rest);

@@ -137,6 +137,10 @@ std::pair<double, double> parse_range(const std::string& option, const std::stri
 /// Reads "5.8GHz", "868MHz", "2.4e9" and the like as hertz. Throws Error{kUsage}.
 double parse_frequency(const std::string& text);
 
+/// The typed place in the CRS of the data, converted from `crs` where that is given; its height as
+/// typed. Throws Error{kInput}.
+MapPoint to_map_point(const TypedPosition& typed, const std::string& crs, const GeoFrame& frame);
+
 /// Reads "2GiB", "512M", "1000000" and the like as bytes. Throws Error{kUsage}.
 std::uint64_t parse_bytes(const std::string& text);
 

@@ -1,7 +1,6 @@
 #include "cli/build/layers.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 
 #include "core/sight/line_of_sight.h"

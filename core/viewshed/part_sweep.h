@@ -50,7 +50,7 @@ struct SweepCounts {
 /// open is decided by exact predicates, so the result has no error.
 /// Requires of the grid what GridSight requires.
 /// Cost: O(1) a sample and bin, about 1.5 bins a sample; O(columns + rows) memory.
-/// Source: the interval method, docs/viewshed.md.
+/// Source: own; an interval of the horizon in each narrow bin, and exact tracing between.
 class PartSweep {
  public:
   /// @param sight, ground    for the same grid, eye and target height, kept by reference

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <gdal_priv.h>
+#include <ogr_spatialref.h>
 
 #include <memory>
 #include <string>
@@ -11,6 +12,13 @@ struct CloseDataset {
   void operator()(GDALDataset* dataset) const { GDALClose(dataset); }
 };
 using DatasetPtr = std::unique_ptr<GDALDataset, CloseDataset>;
+
+struct DestroyTransformation {
+  void operator()(OGRCoordinateTransformation* t) const {
+    OGRCoordinateTransformation::DestroyCT(t);
+  }
+};
+using TransformationPtr = std::unique_ptr<OGRCoordinateTransformation, DestroyTransformation>;
 
 /// Opens a file for reading, drivers registered and side files off.
 /// Throws Error{kInput} that names the file and GDAL's own reason.

@@ -16,13 +16,6 @@
 namespace scarp {
 namespace {
 
-struct DestroyTransformation {
-  void operator()(OGRCoordinateTransformation* t) const {
-    OGRCoordinateTransformation::DestroyCT(t);
-  }
-};
-using TransformationPtr = std::unique_ptr<OGRCoordinateTransformation, DestroyTransformation>;
-
 /// GDAL's messages go to nobody while this lives; what matters is said by our own.
 struct QuietGdal {
   QuietGdal() { CPLPushErrorHandler(CPLQuietErrorHandler); }

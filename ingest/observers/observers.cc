@@ -16,13 +16,6 @@
 namespace scarp {
 namespace {
 
-struct DestroyTransformation {
-  void operator()(OGRCoordinateTransformation* t) const {
-    OGRCoordinateTransformation::DestroyCT(t);
-  }
-};
-using TransformationPtr = std::unique_ptr<OGRCoordinateTransformation, DestroyTransformation>;
-
 [[noreturn]] void refuse(const std::string& file, const std::string& rest) {
   throw Error(ErrorCode::kInput, fmt::format("'{}': {}", file, rest));
 }
