@@ -1,10 +1,12 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdlib>
 #include <functional>
 #include <map>
 #include <new>
 
+#include "cli/build/certified_settings.h"
 #include "cli/commands.h"
 #include "cli/stage_clock.h"
 #include "core/error/error.h"
@@ -64,14 +66,32 @@ void add_build(CLI::App& app, BuildOptions& o, std::function<int()>& run) {
   c->add_option("--height-field", o.footprints_height_field,
                 "Field of --footprints with heights above ground, metres; height unless given");
   c->add_option("--horizon", o.horizon,
-                "stewart: horizons of vertices, fast, may cull what is visible; certified: regions "
-                "made never to, besides (young, slow); stewart unless given")
-      ->check(CLI::IsMember({"stewart", "certified"}));
-  c->add_option("--sectors", o.sectors, "Directions that horizons are kept for; 16 unless given")
-      ->check(CLI::Range(4, 1024));
+                "certified: regions that never cull what is visible; stewart: horizons of "
+                "vertices, as published, faster, may cull what is visible; both; certified unless "
+                "given")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, Hiding>{{"certified", Hiding::kCertified},
+                                                                {"stewart", Hiding::kStewart},
+                                                                {"both", Hiding::kBoth}}));
+  c->add_option("--sectors", o.sectors,
+                "Directions that are kept. Certified: a multiple of 8, as many as 16 bytes a "
+                "triangle hold unless given; stewart: 16 unless given (and with both)")
+      ->check(CLI::Range(4, 4096));
   c->add_option("--subsectors", o.subsectors,
-                "Parts of a sector, the lowest counts; 4 unless given")
+                "Stewart: parts of a sector, the lowest counts; 4 unless given")
       ->check(CLI::Range(1, 64));
+  c->add_option("--fans", o.fans,
+                fmt::format("Certified: directions that are looked along, a multiple of 8; more "
+                            "take longer and cull more; {} unless given",
+                            HidingOptions{}.fans))
+      ->check(CLI::Range(8, 65'536))
+      ->check([](const std::string& text) {
+        return std::atoi(text.c_str()) % 8 == 0 ? "" : text + " is not a multiple of 8";
+      });
+  c->add_option("--patch", o.patch,
+                "Certified: size of what is looked at at once, in mean distances between vertices; "
+                "greater is faster and culls less; 1 unless given")
+      ->check(CLI::Range(0.125, 64.0));
   c->add_option("--group-triangles", o.group_triangles,
                 "Mean triangles of a group that is aimed at; 128 unless given")
       ->check(CLI::Range(2, 1'000'000));
@@ -82,8 +102,8 @@ void add_build(CLI::App& app, BuildOptions& o, std::function<int()>& run) {
        [&o](const std::string& text) {
          o.growth = text == "breadth-first" ? Growth::kBreadthFirst : Growth::kHiddenTogether;
        },
-       "hidden-together, from a sample of eyes, or breadth-first, as published; hidden-together "
-       "unless given")
+       "hidden-together, from a sample of eyes, or breadth-first, as published, which needs "
+       "--horizon stewart or both; hidden-together unless given")
       ->check(CLI::IsMember({"hidden-together", "breadth-first"}));
   c->add_option("--seeds", o.seeds,
                 "Breadth-first: crystals sown in the first pass, over --group-triangles");

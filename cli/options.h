@@ -31,6 +31,19 @@ struct TypedPosition {
 /// What guides the growth of groups.
 enum class Growth { kHiddenTogether, kBreadthFirst };
 
+/// What a scene is built to be culled by.
+enum class Hiding {
+  kCertified,  ///< regions that are never wrong on the unsafe side
+  kStewart,    ///< horizons of the vertices, as published
+  kBoth,
+};
+inline bool has_certified(Hiding hiding) {
+  return hiding != Hiding::kStewart;
+}
+inline bool has_stewart(Hiding hiding) {
+  return hiding != Hiding::kCertified;
+}
+
 struct BuildOptions {
   CommonOptions common;
   DemOptions dem;
@@ -40,9 +53,13 @@ struct BuildOptions {
   std::optional<std::uint32_t> vertices;
   std::string footprints_file;
   std::string footprints_height_field = "height";
-  std::string horizon = "stewart";  ///< or "certified": that, and certified regions
-  int sectors = 16;
-  int subsectors = 4;
+  Hiding horizon = Hiding::kCertified;
+  /// Of certified regions where there are any: as many as kCertifiedBytes hold; of horizons
+  /// otherwise: 16.
+  std::optional<int> sectors;
+  std::optional<int> subsectors;  ///< of horizons; 4
+  std::optional<int> fans;        ///< of certified regions
+  std::optional<double> patch;    ///< of certified regions
   Growth growth = Growth::kHiddenTogether;
   int group_triangles = 128;
   std::uint32_t min_group_triangles = 30;

@@ -9,7 +9,7 @@
 #include "cli/commands.h"
 #include "cli/loaded_scene.h"
 #include "cli/progress_bar.h"
-#include "core/culling/certified_culling.h"
+#include "cli/scene_culling.h"
 #include "core/culling/visible_groups.h"
 #include "core/error/error.h"
 #include "core/occlusion/splitmix64.h"
@@ -58,10 +58,7 @@ std::vector<VerifyCounts> verify_scene(const LoadedScene& scene, int eyes,
                                        const std::vector<double>& heights_m, std::uint64_t seed,
                                        const Progress& progress) {
   const GeoFrame::Placer placer(scene.frame);
-  std::vector<std::unique_ptr<CullingMethod>> methods;
-  methods.push_back(std::make_unique<ThesisCulling>(scene.groups));
-  if (scene.groups.has_certified())
-    methods.push_back(std::make_unique<CertifiedCulling>(scene.groups.certified));
+  const std::vector<std::unique_ptr<CullingMethod>> methods = culling_methods(scene);
   std::vector<VerifyCounts> all(methods.size() * heights_m.size());  // by method, then height
   double done = 0;
   for (std::size_t h = 0; h < heights_m.size(); ++h) {

@@ -30,8 +30,22 @@ std::string growth_name(Growth growth) {
   return growth == Growth::kBreadthFirst ? "breadth-first" : "hidden-together";
 }
 
+std::string horizon_name(Hiding horizon) {
+  return horizon == Hiding::kCertified ? "certified"
+         : horizon == Hiding::kStewart ? "stewart"
+                                       : "both";
+}
+
+SectorLayout stewart_layout(const BuildOptions& options) {
+  SectorLayout layout;
+  if (!has_certified(options.horizon)) layout.count = options.sectors.value_or(layout.count);
+  layout.subsectors = options.subsectors.value_or(layout.subsectors);
+  return layout;
+}
+
 nlohmann::json build_report(const BuildOptions& options, const Dem& dem, const Mesh& mesh,
                             const MeshOptions& mesh_options, const Groups& groups,
+                            const std::optional<CertifiedSettings>& certified,
                             const GroupingReport& grouping, const MapPoint& observer,
                             const std::vector<StageCost>& stages) {
   nlohmann::json report;
@@ -47,9 +61,7 @@ nlohmann::json build_report(const BuildOptions& options, const Dem& dem, const M
       {"refraction", frame.refraction},
       {"heights", frame.geoid_file.empty() ? "taken as ellipsoidal" : "geoid undulation added"},
       {"height_unit", dem.height_unit},
-      {"sectors", options.sectors},
-      {"subsectors", options.subsectors},
-      {"horizon", options.horizon},
+      {"horizon", horizon_name(options.horizon)},
       {"growth", growth_name(options.growth)},
       {"group_triangles", options.group_triangles},
       {"min_group_triangles", options.min_group_triangles},
@@ -68,12 +80,15 @@ nlohmann::json build_report(const BuildOptions& options, const Dem& dem, const M
                       {"orphans", grouping.orphans},
                       {"passes", grouping.passes},
                       {"triangles_of_a_group", group_sizes(groups)}};
-  if (groups.has_certified()) {
-    const CertifiedRegions& regions = groups.certified;
-    report["certified"] = {{"sectors", regions.layout.sectors},
-                           {"bytes", regions.groups.size() * sizeof(CertifiedGroup) +
-                                         regions.steps.size() * sizeof(SectorSteps)}};
+  if (has_stewart(options.horizon)) {
+    const SectorLayout layout = stewart_layout(options);
+    report["stewart"] = {{"sectors", layout.count}, {"subsectors", layout.subsectors}};
   }
+  if (certified)
+    report["certified"] = {{"sectors", certified->sectors},
+                           {"fans", certified->fans},
+                           {"patch", certified->patch},
+                           {"bytes", certified_bytes(groups.certified)}};
   for (const StageCost& stage : stages)
     report["stages"].push_back({{"name", stage.name},
                                 {"seconds", stage.seconds},

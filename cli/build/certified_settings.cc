@@ -1,0 +1,20 @@
+#include "cli/build/certified_settings.h"
+
+namespace scarp {
+
+HidingOptions hiding_options(const CertifiedSettings& settings) {
+  HidingOptions options;
+  options.fans = settings.fans;
+  options.sectors = settings.sectors;
+  options.spacing *= settings.patch;
+  options.width *= settings.patch;
+  options.piece *= settings.patch;
+  return options;
+}
+
+std::size_t certified_bytes(const CertifiedRegions& regions) {
+  return regions.groups.size() * sizeof(CertifiedGroup) +
+         regions.steps.size() * sizeof(SectorSteps);
+}
+
+}  // namespace scarp
