@@ -3,13 +3,16 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "cli/build/budget.h"
 #include "cli/build/certified_settings.h"
 #include "cli/build/layers.h"
 #include "cli/build/report.h"
 #include "cli/commands.h"
 #include "cli/loaded_scene.h"
 #include "cli/picture_size.h"
+#include "cli/scene_culling.h"
 #include "cli/stages.h"
+#include "cli/verify.h"
 #include "core/error/error.h"
 #include "core/horizon/stewart.h"
 #include "core/occlusion/build_groups.h"
@@ -47,8 +50,12 @@ class Build {
     else
       horizon_ = no_horizons(mesh_.tin.vertices.size());
     stages_.run("groups", [&](const Progress& p) { groups(p); });
-    if (has_certified(options_.horizon))
+    if (has_certified(options_.horizon)) {
+      choose_settings();
+      if (options_.budget.seconds) stages_.run("measure", [&](const Progress& p) { measure(p); });
       stages_.run("certify", [&](const Progress& p) { certify(p); });
+    }
+    stages_.run("verify", [&](const Progress& p) { verify(p); });
     stages_.run("layers", [&](const Progress& p) {
       write_group_file();
       layers(p);
@@ -120,12 +127,45 @@ class Build {
     }
   }
 
-  void certify(const Progress& progress) {
+  void choose_settings() {
     CertifiedSettings& settings = certified_.emplace();
-    settings.sectors = options_.sectors.value_or(
-        sectors_within(kCertifiedBytes, mesh_.tin.triangles.size(), groups_.leaf_count));
+    const double bytes = options_.budget.bytes_per_triangle.value_or(kCertifiedBytes);
+    const std::size_t triangles = mesh_.tin.triangles.size();
+    settings.sectors =
+        options_.sectors.value_or(sectors_within(bytes, triangles, groups_.leaf_count));
     settings.fans = options_.fans.value_or(settings.fans);
     settings.patch = options_.patch.value_or(settings.patch);
+    if (!options_.budget.bytes_per_triangle) return;
+    const double least = least_bytes(groups_.leaf_count) / static_cast<double>(triangles);
+    if (bytes < least)
+      throw Error(ErrorCode::kUsage,
+                  fmt::format("--budget {:g}B/triangle: the fewest sectors take {:.2f} in these "
+                              "groups; give that, or larger --group-triangles",
+                              bytes, least));
+  }
+
+  /// Chooses the fans that --budget allows.
+  void measure(const Progress& progress) {
+    const CertifyCost cost = measure_certify_cost(mesh_.tin, groups_, *certified_, progress);
+    const double seconds = *options_.budget.seconds;
+    certified_->fans = fans_within(seconds, cost);
+    budget_ = BudgetChoice{seconds, cost.measured_s, cost.at(certified_->fans)};
+    if (cost.measured_s + budget_->predicted_s > seconds)
+      dem_.warnings.push_back(
+          fmt::format("--budget {:g}s: certifying is expected to take {:.1f} s with the fewest "
+                      "fans, {}; give more time, or a larger --max-error",
+                      seconds, cost.measured_s + budget_->predicted_s, kFewestFans));
+  }
+
+  /// A sample of what `scarp verify` prints, for the report.
+  void verify(const Progress& progress) {
+    const auto methods = culling_methods(groups_, has_stewart(options_.horizon));
+    verified_ = verify_culling(*index_, groups_, *dem_.frame, methods,
+                               sampled_plan(mesh_.tin.triangles.size()), progress);
+  }
+
+  void certify(const Progress& progress) {
+    const CertifiedSettings& settings = *certified_;
     groups_.certified = certify_groups(mesh_.tin, groups_.group_of_triangle, groups_.leaf_count,
                                        hiding_options(settings), progress);
   }
@@ -197,8 +237,9 @@ class Build {
   }
 
   void finish() {
-    report_ = build_report(options_, dem_, mesh_, mesh_options_, groups_, certified_, grouping_,
-                           observer_, stages_.costs());
+    report_ = build_report(options_, dem_, mesh_, mesh_options_, groups_, certified_, budget_,
+                           grouping_, observer_, stages_.costs());
+    report_["verify"] = to_json(verified_);
     const std::string text = report_.dump(2) + "\n";
     add_layer("report.json", "json", [&](const std::string& path) {
       write_file(path, std::as_bytes(std::span(text)), Existing::kRefuse);
@@ -268,6 +309,8 @@ class Build {
   HorizonTable horizon_;
   Groups groups_;
   std::optional<CertifiedSettings> certified_;
+  std::optional<BudgetChoice> budget_;
+  std::vector<VerifyCounts> verified_;
   GroupingReport grouping_;
   MapPoint observer_;
   Position eye_;
@@ -292,6 +335,17 @@ void print_summary(const BuildOptions& options, const nlohmann::json& report) {
   fmt::print("{} groups, {} orphans; {:.1f} s, {:.0f} MiB\n", groups["groups"].get<std::uint64_t>(),
              groups["orphans"].get<std::uint64_t>(), seconds,
              static_cast<double>(peak_bytes) / 0x1p20);
+  if (!report.contains("certified")) return;
+  const auto& certified = report["certified"];
+  fmt::print("certified with --fans {} --sectors {} --patch {:g}: {:.1f} bytes a triangle",
+             certified["fans"].get<int>(), certified["sectors"].get<int>(),
+             certified["patch"].get<double>(),
+             certified["bytes"].get<double>() / mesh["triangles"].get<double>());
+  for (const auto& row : report["verify"])
+    if (row["method"] == "certified" && !row["share"].is_null())
+      fmt::print("; {:g} m up it culls {:.0f} % of the hidden groups",
+                 row["eye_height_m"].get<double>(), 100 * row["share"].get<double>());
+  fmt::print("\n");
 }
 
 /// Options that would have no effect are a mistake.
@@ -312,6 +366,13 @@ void refuse_idle_options(const BuildOptions& options) {
     refuse("--subsectors", "--horizon stewart or both");
   if (options.fans && !has_certified(options.horizon))
     refuse("--fans", "--horizon certified or both");
+  if ((options.budget.seconds || options.budget.bytes_per_triangle) &&
+      !has_certified(options.horizon))
+    refuse("--budget", "--horizon certified or both");
+  if (options.budget.seconds && options.fans)
+    throw Error(ErrorCode::kUsage, "--fans: chosen by a --budget of time; give one of the two");
+  if (options.budget.bytes_per_triangle && options.sectors)
+    throw Error(ErrorCode::kUsage, "--sectors: chosen by a --budget of bytes; give one of the two");
   if (options.patch && !has_certified(options.horizon))
     refuse("--patch", "--horizon certified or both");
 }

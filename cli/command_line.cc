@@ -92,6 +92,16 @@ void add_build(CLI::App& app, BuildOptions& o, std::function<int()>& run) {
                 "Certified: size of what is looked at at once, in mean distances between vertices; "
                 "greater is faster and culls less; 1 unless given")
       ->check(CLI::Range(0.125, 64.0));
+  c->add_option_function<std::vector<std::string>>(
+       "--budget",
+       [&o](const std::vector<std::string>& texts) {
+         for (const std::string& text : texts) take_budget(text, o.budget);
+       },
+       "Certified: what certifying may take, 10s, 5min, 1h on this machine, which chooses --fans; "
+       "or "
+       "what regions may take, 4B/triangle, which chooses --sectors; may be given for both. The "
+       "choice is written to scene.json and report.json")
+      ->allow_extra_args(false);
   c->add_option("--group-triangles", o.group_triangles,
                 "Mean triangles of a group that is aimed at; 128 unless given")
       ->check(CLI::Range(2, 1'000'000));

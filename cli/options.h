@@ -44,6 +44,12 @@ inline bool has_stewart(Hiding hiding) {
   return hiding != Hiding::kCertified;
 }
 
+/// What certified regions may cost.
+struct Budget {
+  std::optional<double> seconds;             ///< of certifying, on this machine
+  std::optional<double> bytes_per_triangle;  ///< of what is stored
+};
+
 struct BuildOptions {
   CommonOptions common;
   DemOptions dem;
@@ -60,6 +66,7 @@ struct BuildOptions {
   std::optional<int> subsectors;  ///< of horizons; 4
   std::optional<int> fans;        ///< of certified regions
   std::optional<double> patch;    ///< of certified regions
+  Budget budget;                  ///< of certified regions
   Growth growth = Growth::kHiddenTogether;
   int group_triangles = 128;
   std::uint32_t min_group_triangles = 30;
@@ -157,6 +164,12 @@ double parse_frequency(const std::string& text);
 /// The typed place in the CRS of the data, converted from `crs` where that is given; its height as
 /// typed. Throws Error{kInput}.
 MapPoint to_map_point(const TypedPosition& typed, const std::string& crs, const GeoFrame& frame);
+
+/// Reads "10s", "5min" or "1h", or "4B/triangle", into what it limits. Throws Error{kUsage}.
+void take_budget(const std::string& text, Budget& budget);
+
+/// Reads "10s", "5min" or "1h" as seconds, or nothing where it is not understood.
+std::optional<double> parse_duration(const std::string& text);
 
 /// Reads "2GiB", "512M", "1000000" and the like as bytes. Throws Error{kUsage}.
 std::uint64_t parse_bytes(const std::string& text);

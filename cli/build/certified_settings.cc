@@ -17,4 +17,10 @@ std::size_t certified_bytes(const CertifiedRegions& regions) {
          regions.steps.size() * sizeof(SectorSteps);
 }
 
+double least_bytes(std::uint32_t groups) {
+  constexpr int kFewestSectors = 8;
+  return static_cast<double>(groups) *
+         static_cast<double>(sizeof(CertifiedGroup) + kFewestSectors * sizeof(SectorSteps));
+}
+
 }  // namespace scarp

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include "core/occlusion/certified/certified_regions.h"
 #include "core/occlusion/certified/hiding_bounds.h"
@@ -20,8 +21,18 @@ struct CertifiedSettings {
   friend bool operator==(const CertifiedSettings&, const CertifiedSettings&) = default;
 };
 
+/// How the fans were chosen, where a budget chose them.
+struct BudgetChoice {
+  double seconds = 0;      ///< that were allowed
+  double measured_s = 0;   ///< that measuring took
+  double predicted_s = 0;  ///< of certifying
+};
+
 /// In the words of the core.
 HidingOptions hiding_options(const CertifiedSettings& settings);
+
+/// The least that regions of so many groups can take, bytes.
+double least_bytes(std::uint32_t groups);
 
 /// What regions take in memory and on disk.
 std::size_t certified_bytes(const CertifiedRegions& regions);

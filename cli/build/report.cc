@@ -6,15 +6,15 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "cli/verify.h"
+
 namespace scarp {
 namespace {
 
 nlohmann::json group_sizes(const Groups& groups) {
-  std::vector<std::uint32_t> sizes;
-  for (GroupIndex g = 0; g < groups.leaf_count; ++g) sizes.push_back(groups.nodes[g].triangles);
-  std::sort(sizes.begin(), sizes.end());
-  if (sizes.empty()) return nullptr;
-  return {{"least", sizes.front()}, {"median", sizes[sizes.size() / 2]}, {"most", sizes.back()}};
+  if (groups.leaf_count == 0) return nullptr;
+  const GroupFigures figures = figures_of(groups);
+  return {{"least", figures.least}, {"median", figures.median}, {"most", figures.most}};
 }
 
 }  // namespace
@@ -46,6 +46,7 @@ SectorLayout stewart_layout(const BuildOptions& options) {
 nlohmann::json build_report(const BuildOptions& options, const Dem& dem, const Mesh& mesh,
                             const MeshOptions& mesh_options, const Groups& groups,
                             const std::optional<CertifiedSettings>& certified,
+                            const std::optional<BudgetChoice>& budget,
                             const GroupingReport& grouping, const MapPoint& observer,
                             const std::vector<StageCost>& stages) {
   nlohmann::json report;
@@ -89,6 +90,10 @@ nlohmann::json build_report(const BuildOptions& options, const Dem& dem, const M
                            {"fans", certified->fans},
                            {"patch", certified->patch},
                            {"bytes", certified_bytes(groups.certified)}};
+  if (budget)
+    report["certified"]["budget"] = {{"seconds", budget->seconds},
+                                     {"measured_s", budget->measured_s},
+                                     {"predicted_s", budget->predicted_s}};
   for (const StageCost& stage : stages)
     report["stages"].push_back({{"name", stage.name},
                                 {"seconds", stage.seconds},

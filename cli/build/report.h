@@ -28,6 +28,7 @@ SectorLayout stewart_layout(const BuildOptions& options);
 nlohmann::json build_report(const BuildOptions& options, const Dem& dem, const Mesh& mesh,
                             const MeshOptions& mesh_options, const Groups& groups,
                             const std::optional<CertifiedSettings>& certified,
+                            const std::optional<BudgetChoice>& budget,
                             const GroupingReport& grouping, const MapPoint& observer,
                             const std::vector<StageCost>& stages);
 

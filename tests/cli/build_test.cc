@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "cli/build/budget.h"
 #include "tests/support/run_scarp.h"
 #include "tests/support/temp_folder.h"
 
@@ -70,7 +71,17 @@ TEST_F(BuiltScene, ReportTellsWhatWasDone) {
     EXPECT_GT(stage["peak_memory_bytes"], 1 << 20);
   }
   EXPECT_EQ(stages, (std::set<std::string>{"read", "place", "mesh", "horizons", "groups", "certify",
-                                           "layers", "preview"}));
+                                           "verify", "layers", "preview"}));
+  EXPECT_EQ(report["certified"]["fans"], 8);
+  EXPECT_LE(report["certified"]["bytes"], 16 * report["mesh"]["triangles"].get<double>());
+  ASSERT_EQ(report["verify"].size(), 4U);  // two methods, two heights
+  for (const json& row : report["verify"]) {
+    EXPECT_GT(row["hidden"], 0);
+    EXPECT_LE(row["triangles"], 3 * report["mesh"]["triangles"].get<double>());
+    if (row["method"] == "certified") {
+      EXPECT_EQ(row["falsely_culled"], 0);
+    }
+  }
   EXPECT_TRUE(report["versions"].contains("gdal"));
 }
 
@@ -174,6 +185,8 @@ TEST_F(BuiltScene, VerifyCountsAddUp) {
     if (c["method"] == "certified") {
       EXPECT_EQ(c["falsely_culled"], 0);
       EXPECT_LE(c["culled"], c["in_hidden_groups"]);
+      EXPECT_LE(c["bytes_per_triangle"], 16);
+      EXPECT_EQ(c["orphans"], 0);
     }
     EXPECT_EQ(c["eyes"], 2);
     EXPECT_EQ(c["triangles"], 2 * triangles);
@@ -239,6 +252,39 @@ TEST_F(BuiltScene, CullTakesCertifiedWhereTheSceneHasItAndRefusesWhatItHasNot) {
     ASSERT_EQ(judged.size(), 1U);
     EXPECT_NE(judged[0]["method"], method);
   }
+}
+
+TEST_F(BuiltScene, WhatABudgetChoosesIsRepeatedByExplicitFlags) {
+  const std::string chosen = folder_->path("chosen"), repeated = folder_->path("repeated");
+  const std::string build = "$SCARP build " + dem_ + " --max-error 150 --json -o ";
+  const RunResult run = run_scarp(build + chosen + " --budget 1s --budget 4B/triangle");
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  const json report = json::parse(run.output), scene = read_json(chosen + "/scene.json");
+  EXPECT_LE(report["certified"]["bytes"], 4 * report["mesh"]["triangles"].get<double>());
+  EXPECT_EQ(report["certified"]["budget"]["seconds"], 1);
+  EXPECT_GT(report["certified"]["budget"]["predicted_s"], 0);
+  EXPECT_EQ(report["certified"]["fans"], scene["parameters"]["fans"]);
+  const auto flag = [&](const std::string& name) {
+    return " --" + name + " " + scene["parameters"][name].dump();
+  };
+  ASSERT_EQ(run_scarp(build + repeated + flag("fans") + flag("sectors") + flag("patch")).exit_code,
+            0);
+  const json again = read_json(repeated + "/scene.json");
+  EXPECT_EQ(again["tiles"], scene["tiles"]);
+  EXPECT_EQ(again["parameters"], scene["parameters"]);
+}
+
+TEST(Budget, IsKeptToByTheMostFansThatFit) {
+  const CertifyCost cost{1, 0.1, 0.5};  // base, each fan, measuring
+  for (const double seconds : {3.0, 10.0, 60.0}) {
+    const int fans = fans_within(seconds, cost);
+    EXPECT_EQ(fans % 8, 0);
+    EXPECT_LE(cost.measured_s + cost.at(fans), seconds);
+    EXPECT_GT(cost.measured_s + cost.at(fans + 8), kPlannedShare * seconds);
+  }
+  EXPECT_EQ(fans_within(0.1, cost), kFewestFans);
+  EXPECT_EQ(fans_within(1e9, cost), kMostFansOfBudget);
+  EXPECT_EQ(fans_within(1, CertifyCost{}), kMostFansOfBudget);
 }
 
 TEST_F(BuiltScene, PreviewDrawsPicturesOfTheAskedWidth) {
@@ -311,6 +357,14 @@ TEST_F(BuiltScene, RefusalsAreOneLineAndLeaveNothingBehind) {
       {"build " + dem + " -o " + f + "/x --fans 16 --horizon stewart", 2, "--horizon certified"},
       {"build " + dem + " -o " + f + "/x --patch 2 --horizon stewart", 2, "--horizon certified"},
       {"build " + dem + " -o " + f + "/x --subsectors 2", 2, "--horizon stewart"},
+      {"build " + dem + " -o " + f + "/x --budget 10", 2, "10s"},
+      {"build " + dem + " -o " + f + "/x --budget -1s", 2, "10s"},
+      {"build " + dem + " -o " + f + "/x --budget 4B", 2, "4B/triangle"},
+      {"build " + dem + " -o " + f + "/x --budget 9s --fans 8", 2, "--fans"},
+      {"build " + dem + " -o " + f + "/x --budget 9B/triangle --sectors 8", 2, "--sectors"},
+      {"build " + dem + " -o " + f + "/x --budget 9s --horizon stewart", 2, "--budget"},
+      {"build " + dem + " -o " + f + "/x --budget 0.1B/triangle --max-error 99", 2,
+       "the fewest sectors take"},
       {"build " + dem + " -o " + f + "/x --growth fast", 2, "--growth"},
       {"build " + dem + " -o " + f + "/x --growth breadth-first", 2, "--horizon stewart"},
       {"build " + dem + " -o " + f + "/x --seeds 100", 2, "--growth breadth-first"},
