@@ -270,6 +270,36 @@ void add_verify(CLI::App& app, VerifyOptions& o, std::function<int()>& run) {
   c->callback([&] { run = [&o] { return run_verify(o); }; });
 }
 
+void add_compare(CLI::App& app, CompareOptions& o, std::function<int()>& run) {
+  CLI::App* c = app.add_subcommand("compare", "Chart what culling methods cull against their cost");
+  c->footer(
+      "Example:\n  scarp compare alps.scene -o alps-compared --time 5min\n"
+      "Prepares the scene's mesh anew with several settings of each method and judges them from\n"
+      "random eyes. Writes compare.svg and compare.csv into the folder. Settings that would not\n"
+      "fit into the time are left out and named.");
+  c->add_option("scene", o.scene, "A scene")->required();
+  c->add_option("-o,--output", o.output, "A folder for compare.svg and compare.csv")->required();
+  c->add_option("--eyes", o.eyes, "Random eyes for each height; 4 unless given")
+      ->check(CLI::Range(1, 1'000'000));
+  c->add_option("--heights", o.heights_m, "Metres above ground; 2,50,300,1000 unless given")
+      ->delimiter(',');
+  c->add_option("--seed", o.seed, "Where the random eyes begin; 1 unless given");
+  c->add_option_function<std::string>(
+      "--time",
+      [&o](const std::string& text) {
+        const auto seconds = parse_duration(text);
+        if (!seconds)
+          throw Error(
+              ErrorCode::kUsage,
+              fmt::format("--time {}: not understood; a time such as 90s or 5min was expected",
+                          text));
+        o.limit_s = *seconds;
+      },
+      "What it may take in all; 5min unless given");
+  add_common(*c, o.common);
+  c->callback([&] { run = [&o] { return run_compare(o); }; });
+}
+
 void add_preview(CLI::App& app, PreviewCommandOptions& o, std::function<int()>& run) {
   CLI::App* c = app.add_subcommand("preview", "Draw a scene as a picture");
   c->footer(
@@ -319,6 +349,7 @@ int run_command_line(int argc, char** argv) {
   BuildOptions build;
   CullOptions cull;
   VerifyOptions verify;
+  CompareOptions compare;
   PreviewCommandOptions preview;
   ViewshedOptions viewshed;
   SightOptions sight;
@@ -328,6 +359,7 @@ int run_command_line(int argc, char** argv) {
   add_build(app, build, run);
   add_cull(app, cull, run);
   add_verify(app, verify, run);
+  add_compare(app, compare, run);
   add_preview(app, preview, run);
   add_viewshed(app, viewshed, run);
   add_sight(app, sight, run);
@@ -344,8 +376,8 @@ int run_command_line(int argc, char** argv) {
   }
   try {
     for (CommonOptions* common :
-         {&build.common, &cull.common, &verify.common, &preview.common, &viewshed.common,
-          &sight.common, &horizon.common, &check.common}) {
+         {&build.common, &cull.common, &verify.common, &compare.common, &preview.common,
+          &viewshed.common, &sight.common, &horizon.common, &check.common}) {
       if (!common->memory_budget_bytes) common->memory_budget_bytes = machine_memory_bytes() / 2;
       if (common->threads) set_thread_count(common->threads);
     }

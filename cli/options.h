@@ -135,6 +135,16 @@ struct VerifyOptions {
   std::uint64_t seed = 1;
 };
 
+struct CompareOptions {
+  CommonOptions common;
+  std::string scene;
+  std::string output;  ///< folder
+  int eyes = 4;
+  std::vector<double> heights_m = {2, 50, 300, 1000};
+  std::uint64_t seed = 1;
+  double limit_s = 300;
+};
+
 struct PreviewCommandOptions {
   CommonOptions common;
   std::string scene;

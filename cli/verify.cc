@@ -17,20 +17,6 @@
 namespace scarp {
 namespace {
 
-/// A place over known ground, evenly distributed over the plan.
-MapPoint random_ground(const TinIndex& index, const Bounds& bounds, const GeoFrame::Placer& placer,
-                       SplitMix64& random) {
-  for (;;) {
-    Position p = round_to_lattice(
-        Position{bounds.low.x_m + random.unit() * (bounds.high.x_m - bounds.low.x_m),
-                 bounds.low.y_m + random.unit() * (bounds.high.y_m - bounds.low.y_m), 0});
-    const auto ground_m = index.ground_height_m(p.x_m, p.y_m);
-    if (!ground_m) continue;
-    p.z_m = *ground_m;
-    return placer.unplace(p);
-  }
-}
-
 std::vector<TriangleIndex> sampled_triangles(const Groups& groups, std::uint32_t stride) {
   std::vector<TriangleIndex> triangles;
   for (TriangleIndex t = 0; t < groups.group_of_triangle.size(); ++t) {
@@ -38,28 +24,6 @@ std::vector<TriangleIndex> sampled_triangles(const Groups& groups, std::uint32_t
     if ((group == kNone ? t : group) % stride == 0) triangles.push_back(t);
   }
   return triangles;
-}
-
-/// Adds what a method makes of one eye, whose sight the judge has found.
-void count_eye(const Groups& groups, const std::vector<TriangleIndex>& triangles,
-               const std::vector<TriangleSight>& sight, const CullingAnswer& answer,
-               VerifyCounts& counts) {
-  const std::vector<std::uint8_t> culled = culled_triangles(groups, answer);
-  std::vector<std::uint8_t> group_seen(groups.leaf_count, 0);
-  const auto& group_of = groups.group_of_triangle;
-  for (std::size_t i = 0; i < triangles.size(); ++i)
-    if (sight[i] != TriangleSight::kHidden && group_of[triangles[i]] != kNone)
-      group_seen[group_of[triangles[i]]] = 1;
-  for (std::size_t i = 0; i < triangles.size(); ++i) {
-    const TriangleIndex t = triangles[i];
-    const bool hidden = sight[i] == TriangleSight::kHidden;
-    ++counts.triangles;
-    counts.hidden += hidden;
-    counts.in_hidden_groups += group_of[t] != kNone && !group_seen[group_of[t]];
-    counts.culled += culled[t];
-    counts.falsely_culled += culled[t] && !hidden;
-  }
-  ++counts.eyes;
 }
 
 double ratio(std::uint64_t part, std::uint64_t whole) {
@@ -84,12 +48,45 @@ void print_table(const std::vector<VerifyCounts>& all) {
 
 }  // namespace
 
+MapPoint random_ground(const TinIndex& index, const GeoFrame::Placer& placer, SplitMix64& random) {
+  const Bounds bounds = bounds_of(index.tin().vertices);
+  for (;;) {
+    Position p = round_to_lattice(
+        Position{bounds.low.x_m + random.unit() * (bounds.high.x_m - bounds.low.x_m),
+                 bounds.low.y_m + random.unit() * (bounds.high.y_m - bounds.low.y_m), 0});
+    const auto ground_m = index.ground_height_m(p.x_m, p.y_m);
+    if (!ground_m) continue;
+    p.z_m = *ground_m;
+    return placer.unplace(p);
+  }
+}
+
+void count_eye(const Groups& groups, std::span<const TriangleIndex> triangles,
+               std::span<const TriangleSight> sight, const CullingAnswer& answer,
+               VerifyCounts& counts) {
+  const std::vector<std::uint8_t> culled = culled_triangles(groups, answer);
+  std::vector<std::uint8_t> group_seen(groups.leaf_count, 0);
+  const auto& group_of = groups.group_of_triangle;
+  for (std::size_t i = 0; i < triangles.size(); ++i)
+    if (sight[i] != TriangleSight::kHidden && group_of[triangles[i]] != kNone)
+      group_seen[group_of[triangles[i]]] = 1;
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    const TriangleIndex t = triangles[i];
+    const bool hidden = sight[i] == TriangleSight::kHidden;
+    ++counts.triangles;
+    counts.hidden += hidden;
+    counts.in_hidden_groups += group_of[t] != kNone && !group_seen[group_of[t]];
+    counts.culled += culled[t];
+    counts.falsely_culled += culled[t] && !hidden;
+  }
+  ++counts.eyes;
+}
+
 std::vector<VerifyCounts> verify_culling(const TinIndex& index, const Groups& groups,
                                          const GeoFrame& frame,
                                          const std::vector<std::unique_ptr<CullingMethod>>& methods,
                                          const VerifyPlan& plan, const Progress& progress) {
   const GeoFrame::Placer placer(frame);
-  const Bounds bounds = bounds_of(index.tin().vertices);
   const std::size_t heights = plan.heights_m.size();
   const std::vector<TriangleIndex> triangles = sampled_triangles(groups, plan.group_stride);
   std::vector<VerifyCounts> all(methods.size() * heights);  // by method, then height
@@ -104,7 +101,7 @@ std::vector<VerifyCounts> verify_culling(const TinIndex& index, const Groups& gr
     }
     SplitMix64 random(plan.seed);  // the same places at every height
     for (int i = 0; i < plan.eyes; ++i) {
-      MapPoint at = random_ground(index, bounds, placer, random);
+      MapPoint at = random_ground(index, placer, random);
       at.height_m += plan.heights_m[h];
       const Position eye = placer.place(at);
       const std::vector<TriangleSight> sight = judge_each(index, eye, triangles);

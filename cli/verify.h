@@ -3,12 +3,14 @@
 #include <cstdint>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "core/culling/culling_method.h"
 #include "core/occlusion/groups.h"
-#include "core/sight/tin_index.h"
+#include "core/occlusion/splitmix64.h"
+#include "core/sight/triangle_sight.h"
 #include "core/threads/progress.h"
 #include "ingest/crs/geo_frame.h"
 
@@ -33,6 +35,15 @@ struct VerifyPlan {
   std::uint64_t seed = 1;
   std::uint32_t group_stride = 1;  ///< every so many-th group and orphan is judged
 };
+
+/// A place over known ground, evenly distributed over the plan.
+MapPoint random_ground(const TinIndex& index, const GeoFrame::Placer& placer, SplitMix64& random);
+
+/// Adds what a method makes of one eye, whose sight of some triangles the judge has found. All
+/// triangles of a group are judged, or none.
+void count_eye(const Groups& groups, std::span<const TriangleIndex> triangles,
+               std::span<const TriangleSight> sight, const CullingAnswer& answer,
+               VerifyCounts& counts);
 
 /// Judges what methods cull of a surface. Counts by method, then by height.
 /// Cost: a few microseconds for each eye and triangle judged.

@@ -428,7 +428,8 @@ TEST_F(BuiltScene, OverwriteReplacesTheScene) {
 
 TEST(CommandLine, HelpAndVersion) {
   EXPECT_EQ(run_scarp("$SCARP --version").output, "scarp " SCARP_VERSION "\n");
-  for (const char* command : {"build", "cull", "verify", "preview", "sight", "horizon", "check"}) {
+  for (const char* command :
+       {"build", "cull", "verify", "compare", "preview", "sight", "horizon", "check"}) {
     const RunResult help = run_scarp(std::string("$SCARP ") + command + " --help");
     EXPECT_EQ(help.exit_code, 0);
     EXPECT_NE(help.output.find("Example"), std::string::npos) << command;
