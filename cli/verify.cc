@@ -115,7 +115,7 @@ std::vector<VerifyCounts> verify_culling(const TinIndex& index, const Groups& gr
 }
 
 VerifyPlan sampled_plan(std::size_t triangles) {
-  constexpr std::size_t kMostJudged = 200'000;  // about a second on one core
+  constexpr std::size_t kMostJudged = 60'000;  // some tenths of a second on one core
   VerifyPlan plan;
   plan.eyes = 3;
   plan.heights_m = {2, 300};
