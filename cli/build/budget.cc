@@ -13,8 +13,7 @@ namespace {
 
 /// Every so many-th group is certified by a probe.
 constexpr std::array<std::uint32_t, 2> kStrides = {64, 12};
-/// With fewer fans than these the cost hardly falls: each fan is wider.
-constexpr std::array<int, 2> kProbeFans = {32, 96};
+constexpr std::array<int, 2> kProbeFans = {kFewestFans, 3 * kFewestFans};
 
 double seconds_now() {
   using Clock = std::chrono::steady_clock;

@@ -25,10 +25,11 @@ CertifyCost measure_certify_cost(const Tin& tin, const Groups& groups,
                                  const CertifiedSettings& settings, const Progress& progress);
 
 /// The most fans whose cost stays within `seconds`, what was spent on measuring included; the
-/// fewest where none does. A multiple of 8, from 8 to kMostFansOfBudget.
+/// fewest where none does. A multiple of 8, from kFewestFans to kMostFansOfBudget.
 int fans_within(double seconds, const CertifyCost& cost);
 
-inline constexpr int kFewestFans = 8;
+/// Fewer are so wide that each costs more, and the sum no less.
+inline constexpr int kFewestFans = 32;
 /// More find hardly more.
 inline constexpr int kMostFansOfBudget = 1024;
 
