@@ -62,6 +62,11 @@ Certified certify(const std::string& name, Tin tin, bool full) {
   return scene;
 }
 
+Certified drawn_hills(bool full) {
+  return certify("hills", test::triangulated(test::random_hills(32, 32, 30, 3, 400, 0.01, 0.05), 1),
+                 full);
+}
+
 /// Calls prove(scene) for each DEM of the list where the full proof is asked for; otherwise for one
 /// DEM, or for drawn hills where the shared data are not there.
 template <class Prove>
@@ -77,9 +82,7 @@ void for_each_scene(bool full, Prove prove) {
     ++scenes;
     prove(certify(listed.name, std::move(*tin), full));
   }
-  if (scenes == 0)
-    prove(certify("hills",
-                  test::triangulated(test::random_hills(32, 32, 30, 3, 400, 0.01, 0.05), 1), full));
+  if (scenes == 0) prove(drawn_hills(full));
 }
 
 /// A place on the ground, at a vertex or inside a triangle.
@@ -191,6 +194,43 @@ TEST(CertifiedProof, NothingIsVisibleFromJustInsideTheBoundariesOfRegions) {
         << " " << found.eye.y_m << " " << found.eye.z_m;
     EXPECT_GT(found.judged, scene.groups.count);
   });
+}
+
+TEST(CertifiedProof, TheSearchFindsRegionsThatAreTooLarge) {
+  Certified scene = drawn_hills(false);
+  const TinIndex index(scene.tin);
+  const test::BoundaryFinding sound =
+      test::search_boundaries(index, scene.regions, scene.members, {});
+  EXPECT_EQ(sound.false_culls, 0U);
+  EXPECT_GT(sound.least_slack_m, 0);
+  // All regions raised by a little more than the search came close to the truth.
+  for (CertifiedGroup& group : scene.regions.groups) group.height_m += 1.5 * sound.least_slack_m;
+  const test::BoundaryFinding wrong =
+      test::search_boundaries(index, scene.regions, scene.members, {});
+  EXPECT_GT(wrong.false_culls, 0U);
+  ASSERT_LT(wrong.group, scene.groups.count);
+  EXPECT_TRUE(hides_group(scene.regions, wrong.group, wrong.eye));
+  EXPECT_TRUE(test::is_any_seen(index, wrong.eye, scene.members[wrong.group]));
+}
+
+TEST(CertifiedProof, TheSearchStandsOneLatticeStepInsideTheBoundary) {
+  const Certified scene = drawn_hills(false);
+  const Bounds bounds = bounds_of(scene.tin.vertices);
+  SplitMix64 random(5);
+  int found = 0;
+  for (int i = 0; i < 2'000; ++i) {
+    const auto group = static_cast<GroupIndex>(random.below(scene.groups.count));
+    Position eye = scene.tin.vertices[random.below(scene.tin.vertices.size())];
+    const auto z_m = test::greatest_hidden_z(scene.regions, group, eye, bounds.low.z_m - 1'000,
+                                             bounds.high.z_m + 10'000);
+    if (!z_m) continue;
+    ++found;
+    eye.z_m = *z_m;
+    EXPECT_TRUE(hides_group(scene.regions, group, eye));
+    eye.z_m += kLatticeStepM;
+    EXPECT_FALSE(hides_group(scene.regions, group, eye));
+  }
+  EXPECT_GT(found, 200);
 }
 
 }  // namespace
