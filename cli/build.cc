@@ -3,12 +3,16 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "cli/build/budget.h"
+#include "cli/build/certified_settings.h"
 #include "cli/build/layers.h"
 #include "cli/build/report.h"
 #include "cli/commands.h"
 #include "cli/loaded_scene.h"
 #include "cli/picture_size.h"
+#include "cli/scene_culling.h"
 #include "cli/stages.h"
+#include "cli/verify.h"
 #include "core/error/error.h"
 #include "core/horizon/stewart.h"
 #include "core/occlusion/build_groups.h"
@@ -27,9 +31,6 @@
 namespace scarp {
 namespace {
 
-/// What certified regions may take, bytes a triangle of the mesh.
-constexpr double kCertifiedBytes = 16;
-
 /// One build from options to a finished scene, a member function a stage.
 class Build {
  public:
@@ -44,10 +45,17 @@ class Build {
     stages_.run("read", [&](const Progress& p) { read(p); });
     stages_.run("place", [&](const Progress&) { grid_ = place_samples(dem_); });
     stages_.run("mesh", [&](const Progress& p) { mesh(p); });
-    stages_.run("horizons", [&](const Progress& p) { horizons(p); });
+    if (has_stewart(options_.horizon))
+      stages_.run("horizons", [&](const Progress& p) { horizons(p); });
+    else
+      horizon_ = no_horizons(mesh_.tin.vertices.size());
     stages_.run("groups", [&](const Progress& p) { groups(p); });
-    if (options_.horizon == "certified")
+    if (has_certified(options_.horizon)) {
+      choose_settings();
+      if (options_.budget.seconds) stages_.run("measure", [&](const Progress& p) { measure(p); });
       stages_.run("certify", [&](const Progress& p) { certify(p); });
+    }
+    stages_.run("verify", [&](const Progress& p) { verify(p); });
     stages_.run("layers", [&](const Progress& p) {
       write_group_file();
       layers(p);
@@ -74,6 +82,7 @@ class Build {
     mesh_ = mesh_with_walls(grid_, mesh_options_, walls(), progress);
     index_.emplace(mesh_.tin);
     heights_m_ = vertex_heights_m(mesh_.tin, *dem_.frame);
+    choose_observer();  // before the long work: there may be no such place
     add_tile_file("tin", [&](const std::string& path) {
       write_tin(path, mesh_.tin, mesh_.sample_of_vertex, Existing::kRefuse);
     });
@@ -92,8 +101,7 @@ class Build {
   }
 
   void horizons(const Progress& progress) {
-    const SectorLayout layout{options_.sectors, options_.subsectors};
-    horizon_ = stewart_horizons(mesh_.tin.vertices, layout, progress);
+    horizon_ = stewart_horizons(mesh_.tin.vertices, stewart_layout(options_), progress);
     add_tile_file("horizon", [&](const std::string& path) {
       write_horizon(path, horizon_, Existing::kRefuse);
     });
@@ -106,7 +114,7 @@ class Build {
       together.seed = options_.seed;
       together.group_triangles = group_triangles;
       together.min_group_triangles = options_.min_group_triangles;
-      together.compactness = kCompactnessForStewart;
+      if (!has_certified(options_.horizon)) together.compactness = kCompactnessForStewart;
       groups_ = build_groups(mesh_.tin, horizon_, together, progress, &grouping_);
     } else {
       CrystalOptions crystals;
@@ -119,12 +127,47 @@ class Build {
     }
   }
 
+  void choose_settings() {
+    CertifiedSettings& settings = certified_.emplace();
+    const double bytes = options_.budget.bytes_per_triangle.value_or(kCertifiedBytes);
+    const std::size_t triangles = mesh_.tin.triangles.size();
+    settings.sectors =
+        options_.sectors.value_or(sectors_within(bytes, triangles, groups_.leaf_count));
+    settings.fans = options_.fans.value_or(settings.fans);
+    settings.patch = options_.patch.value_or(settings.patch);
+    if (!options_.budget.bytes_per_triangle) return;
+    const double least = least_bytes(groups_.leaf_count) / static_cast<double>(triangles);
+    if (bytes < least)
+      throw Error(ErrorCode::kUsage,
+                  fmt::format("--budget {:g}B/triangle: the fewest sectors take {:.2f} in these "
+                              "groups; give that, or larger --group-triangles",
+                              bytes, least));
+  }
+
+  /// Chooses the fans that --budget allows.
+  void measure(const Progress& progress) {
+    const CertifyCost cost = measure_certify_cost(mesh_.tin, groups_, *certified_, progress);
+    const double seconds = *options_.budget.seconds;
+    certified_->fans = fans_within(seconds, cost);
+    budget_ = BudgetChoice{seconds, cost.measured_s, cost.at(certified_->fans)};
+    if (cost.measured_s + budget_->predicted_s > seconds)
+      dem_.warnings.push_back(
+          fmt::format("--budget {:g}s: certifying is expected to take {:.1f} s with the fewest "
+                      "fans, {}; give more time, or a larger --max-error",
+                      seconds, cost.measured_s + budget_->predicted_s, kFewestFans));
+  }
+
+  /// A sample of what `scarp verify` prints, for the report.
+  void verify(const Progress& progress) {
+    const auto methods = culling_methods(groups_, has_stewart(options_.horizon));
+    verified_ = verify_culling(*index_, groups_, *dem_.frame, methods,
+                               sampled_plan(mesh_.tin.triangles.size()), progress);
+  }
+
   void certify(const Progress& progress) {
-    HidingOptions hiding;
-    hiding.sectors =
-        sectors_within(kCertifiedBytes, mesh_.tin.triangles.size(), groups_.leaf_count);
-    groups_.certified =
-        certify_groups(mesh_.tin, groups_.group_of_triangle, groups_.leaf_count, hiding, progress);
+    const CertifiedSettings& settings = *certified_;
+    groups_.certified = certify_groups(mesh_.tin, groups_.group_of_triangle, groups_.leaf_count,
+                                       hiding_options(settings), progress);
   }
 
   void write_group_file() {
@@ -146,7 +189,6 @@ class Build {
   }
 
   void layers(const Progress& progress) {
-    choose_observer();
     const std::vector<TriangleIndex> triangles = triangle_of_samples(grid_, *index_);
     const std::vector<std::int32_t> group_values = group_of_samples(triangles, groups_);
     RasterLayer groups = layer_over(dem_, std::span(group_values), "group");
@@ -195,8 +237,9 @@ class Build {
   }
 
   void finish() {
-    report_ = build_report(options_, dem_, mesh_, mesh_options_, groups_, grouping_, observer_,
-                           stages_.costs());
+    report_ = build_report(options_, dem_, mesh_, mesh_options_, groups_, certified_, budget_,
+                           grouping_, observer_, stages_.costs());
+    report_["verify"] = to_json(verified_);
     const std::string text = report_.dump(2) + "\n";
     add_layer("report.json", "json", [&](const std::string& path) {
       write_file(path, std::as_bytes(std::span(text)), Existing::kRefuse);
@@ -210,13 +253,20 @@ class Build {
     scene.earth.geoid = frame.geoid_file;
     scene.earth.centre = {frame.centre_x, frame.centre_y, 0};
     scene.raster = {dem_.columns, dem_.rows, dem_.geotransform};
-    scene.parameters = {{"sectors", std::int64_t{options_.sectors}},
-                        {"subsectors", std::int64_t{options_.subsectors}},
-                        {"horizon", options_.horizon},
+    scene.parameters = {{"horizon", horizon_name(options_.horizon)},
                         {"growth", growth_name(options_.growth)},
                         {"group_triangles", std::int64_t{options_.group_triangles}},
                         {"min_group_triangles", std::int64_t{options_.min_group_triangles}},
                         {"seed", static_cast<std::int64_t>(options_.seed)}};
+    if (certified_) {
+      scene.parameters["sectors"] = std::int64_t{certified_->sectors};
+      scene.parameters["fans"] = std::int64_t{certified_->fans};
+      scene.parameters["patch"] = certified_->patch;
+    } else {
+      scene.parameters["sectors"] = std::int64_t{horizon_.layout.count};
+    }
+    if (has_stewart(options_.horizon))
+      scene.parameters["subsectors"] = std::int64_t{horizon_.layout.subsectors};
     if (options_.seeds) scene.parameters["seeds"] = std::int64_t{*options_.seeds};
     if (options_.max_groups > 0) scene.parameters["max_groups"] = std::int64_t{options_.max_groups};
     if (mesh_options_.max_error_m) scene.parameters["max_error_m"] = *mesh_options_.max_error_m;
@@ -258,6 +308,9 @@ class Build {
   std::vector<double> heights_m_;
   HorizonTable horizon_;
   Groups groups_;
+  std::optional<CertifiedSettings> certified_;
+  std::optional<BudgetChoice> budget_;
+  std::vector<VerifyCounts> verified_;
   GroupingReport grouping_;
   MapPoint observer_;
   Position eye_;
@@ -282,6 +335,56 @@ void print_summary(const BuildOptions& options, const nlohmann::json& report) {
   fmt::print("{} groups, {} orphans; {:.1f} s, {:.0f} MiB\n", groups["groups"].get<std::uint64_t>(),
              groups["orphans"].get<std::uint64_t>(), seconds,
              static_cast<double>(peak_bytes) / 0x1p20);
+  if (!report.contains("certified")) return;
+  const auto& certified = report["certified"];
+  fmt::print("certified with --fans {} --sectors {} --patch {:g}: {:.1f} bytes a triangle",
+             certified["fans"].get<int>(), certified["sectors"].get<int>(),
+             certified["patch"].get<double>(),
+             certified["bytes"].get<double>() / mesh["triangles"].get<double>());
+  for (const auto& row : report["verify"])
+    if (row["method"] == "certified" && !row["share"].is_null())
+      fmt::print("; {:g} m up it culls {:.0f} % of the hidden groups",
+                 row["eye_height_m"].get<double>(), 100 * row["share"].get<double>());
+  fmt::print("\n");
+}
+
+/// Options that would have no effect are a mistake.
+void refuse_idle_options(const BuildOptions& options) {
+  const auto refuse = [](const char* option, const char* wants) {
+    throw Error(ErrorCode::kUsage,
+                fmt::format("{}: has no effect without {}; add that, or leave {} out", option,
+                            wants, option));
+  };
+  const bool breadth_first = options.growth == Growth::kBreadthFirst;
+  if (options.seeds && !breadth_first) refuse("--seeds", "--growth breadth-first");
+  if (options.max_groups > 0 && !breadth_first) refuse("--max-groups", "--growth breadth-first");
+  if (breadth_first && !has_stewart(options.horizon))
+    throw Error(ErrorCode::kUsage,
+                "--growth breadth-first: crystals grow by the horizons of the vertices; add "
+                "--horizon stewart or --horizon both");
+  if (options.subsectors && !has_stewart(options.horizon))
+    refuse("--subsectors", "--horizon stewart or both");
+  if (options.fans && !has_certified(options.horizon))
+    refuse("--fans", "--horizon certified or both");
+  if ((options.budget.seconds || options.budget.bytes_per_triangle) &&
+      !has_certified(options.horizon))
+    refuse("--budget", "--horizon certified or both");
+  if (options.budget.seconds && options.fans)
+    throw Error(ErrorCode::kUsage, "--fans: chosen by a --budget of time; give one of the two");
+  if (options.budget.bytes_per_triangle && options.sectors)
+    throw Error(ErrorCode::kUsage, "--sectors: chosen by a --budget of bytes; give one of the two");
+  if (options.patch && !has_certified(options.horizon))
+    refuse("--patch", "--horizon certified or both");
+}
+
+/// Rows of the thesis may be few; certified regions are kept for eighths of the circle.
+void check_sectors(const BuildOptions& options) {
+  if (!options.sectors || !has_certified(options.horizon)) return;
+  if (*options.sectors % 8 != 0 || *options.sectors < 8)
+    throw Error(ErrorCode::kUsage,
+                fmt::format("--sectors {}: certified regions are kept for a multiple of 8 sectors; "
+                            "give {}, or --horizon stewart",
+                            *options.sectors, std::max(8, (*options.sectors + 4) / 8 * 8)));
 }
 
 }  // namespace
@@ -291,12 +394,8 @@ int run_build(const BuildOptions& options) {
     throw Error(
         ErrorCode::kUsage,
         fmt::format("--max-error {}: metres, zero or more, were expected", *options.max_error_m));
-  if (options.growth != Growth::kBreadthFirst && (options.seeds || options.max_groups > 0))
-    throw Error(
-        ErrorCode::kUsage,
-        fmt::format("{}: only --growth breadth-first sows seeds and has a limit; add it, or "
-                    "give --group-triangles",
-                    options.seeds ? "--seeds" : "--max-groups"));
+  refuse_idle_options(options);
+  check_sectors(options);
   Build build(options);
   build.run();
   if (options.common.json)

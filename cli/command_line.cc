@@ -1,10 +1,12 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdlib>
 #include <functional>
 #include <map>
 #include <new>
 
+#include "cli/build/certified_settings.h"
 #include "cli/commands.h"
 #include "cli/stage_clock.h"
 #include "core/error/error.h"
@@ -64,14 +66,42 @@ void add_build(CLI::App& app, BuildOptions& o, std::function<int()>& run) {
   c->add_option("--height-field", o.footprints_height_field,
                 "Field of --footprints with heights above ground, metres; height unless given");
   c->add_option("--horizon", o.horizon,
-                "stewart: horizons of vertices, fast, may cull what is visible; certified: regions "
-                "made never to, besides (young, slow); stewart unless given")
-      ->check(CLI::IsMember({"stewart", "certified"}));
-  c->add_option("--sectors", o.sectors, "Directions that horizons are kept for; 16 unless given")
-      ->check(CLI::Range(4, 1024));
+                "certified: regions that never cull what is visible; stewart: horizons of "
+                "vertices, as published, faster, may cull what is visible; both; certified unless "
+                "given")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, Hiding>{{"certified", Hiding::kCertified},
+                                                                {"stewart", Hiding::kStewart},
+                                                                {"both", Hiding::kBoth}}));
+  c->add_option("--sectors", o.sectors,
+                "Directions that are kept. Certified: a multiple of 8, as many as 16 bytes a "
+                "triangle hold unless given; stewart: 16 unless given (and with both)")
+      ->check(CLI::Range(4, 4096));
   c->add_option("--subsectors", o.subsectors,
-                "Parts of a sector, the lowest counts; 4 unless given")
+                "Stewart: parts of a sector, the lowest counts; 4 unless given")
       ->check(CLI::Range(1, 64));
+  c->add_option("--fans", o.fans,
+                fmt::format("Certified: directions that are looked along, a multiple of 8; more "
+                            "take longer and cull more; {} unless given",
+                            HidingOptions{}.fans))
+      ->check(CLI::Range(8, 65'536))
+      ->check([](const std::string& text) {
+        return std::atoi(text.c_str()) % 8 == 0 ? "" : text + " is not a multiple of 8";
+      });
+  c->add_option("--patch", o.patch,
+                "Certified: size of what is looked at at once, in mean distances between vertices; "
+                "greater is faster and culls less; 1 unless given")
+      ->check(CLI::Range(0.125, 64.0));
+  c->add_option_function<std::vector<std::string>>(
+       "--budget",
+       [&o](const std::vector<std::string>& texts) {
+         for (const std::string& text : texts) take_budget(text, o.budget);
+       },
+       "Certified: what certifying may take, 10s, 5min, 1h on this machine, which chooses --fans; "
+       "or "
+       "what regions may take, 4B/triangle, which chooses --sectors; may be given for both. The "
+       "choice is written to scene.json and report.json")
+      ->allow_extra_args(false);
   c->add_option("--group-triangles", o.group_triangles,
                 "Mean triangles of a group that is aimed at; 128 unless given")
       ->check(CLI::Range(2, 1'000'000));
@@ -82,8 +112,8 @@ void add_build(CLI::App& app, BuildOptions& o, std::function<int()>& run) {
        [&o](const std::string& text) {
          o.growth = text == "breadth-first" ? Growth::kBreadthFirst : Growth::kHiddenTogether;
        },
-       "hidden-together, from a sample of eyes, or breadth-first, as published; hidden-together "
-       "unless given")
+       "hidden-together, from a sample of eyes, or breadth-first, as published, which needs "
+       "--horizon stewart or both; hidden-together unless given")
       ->check(CLI::IsMember({"hidden-together", "breadth-first"}));
   c->add_option("--seeds", o.seeds,
                 "Breadth-first: crystals sown in the first pass, over --group-triangles");
@@ -240,6 +270,36 @@ void add_verify(CLI::App& app, VerifyOptions& o, std::function<int()>& run) {
   c->callback([&] { run = [&o] { return run_verify(o); }; });
 }
 
+void add_compare(CLI::App& app, CompareOptions& o, std::function<int()>& run) {
+  CLI::App* c = app.add_subcommand("compare", "Chart what culling methods cull against their cost");
+  c->footer(
+      "Example:\n  scarp compare alps.scene -o alps-compared --time 5min\n"
+      "Prepares the scene's mesh anew with several settings of each method and judges them from\n"
+      "random eyes. Writes compare.svg and compare.csv into the folder. Settings that would not\n"
+      "fit into the time are left out and named.");
+  c->add_option("scene", o.scene, "A scene")->required();
+  c->add_option("-o,--output", o.output, "A folder for compare.svg and compare.csv")->required();
+  c->add_option("--eyes", o.eyes, "Random eyes for each height; 4 unless given")
+      ->check(CLI::Range(1, 1'000'000));
+  c->add_option("--heights", o.heights_m, "Metres above ground; 2,50,300,1000 unless given")
+      ->delimiter(',');
+  c->add_option("--seed", o.seed, "Where the random eyes begin; 1 unless given");
+  c->add_option_function<std::string>(
+      "--time",
+      [&o](const std::string& text) {
+        const auto seconds = parse_duration(text);
+        if (!seconds)
+          throw Error(
+              ErrorCode::kUsage,
+              fmt::format("--time {}: not understood; a time such as 90s or 5min was expected",
+                          text));
+        o.limit_s = *seconds;
+      },
+      "What it may take in all; 5min unless given");
+  add_common(*c, o.common);
+  c->callback([&] { run = [&o] { return run_compare(o); }; });
+}
+
 void add_preview(CLI::App& app, PreviewCommandOptions& o, std::function<int()>& run) {
   CLI::App* c = app.add_subcommand("preview", "Draw a scene as a picture");
   c->footer(
@@ -289,6 +349,7 @@ int run_command_line(int argc, char** argv) {
   BuildOptions build;
   CullOptions cull;
   VerifyOptions verify;
+  CompareOptions compare;
   PreviewCommandOptions preview;
   ViewshedOptions viewshed;
   SightOptions sight;
@@ -298,6 +359,7 @@ int run_command_line(int argc, char** argv) {
   add_build(app, build, run);
   add_cull(app, cull, run);
   add_verify(app, verify, run);
+  add_compare(app, compare, run);
   add_preview(app, preview, run);
   add_viewshed(app, viewshed, run);
   add_sight(app, sight, run);
@@ -314,8 +376,8 @@ int run_command_line(int argc, char** argv) {
   }
   try {
     for (CommonOptions* common :
-         {&build.common, &cull.common, &verify.common, &preview.common, &viewshed.common,
-          &sight.common, &horizon.common, &check.common}) {
+         {&build.common, &cull.common, &verify.common, &compare.common, &preview.common,
+          &viewshed.common, &sight.common, &horizon.common, &check.common}) {
       if (!common->memory_budget_bytes) common->memory_budget_bytes = machine_memory_bytes() / 2;
       if (common->threads) set_thread_count(common->threads);
     }

@@ -1,30 +1,12 @@
 #include <fmt/format.h>
 
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
 #include "cli/loaded_scene.h"
-#include "core/culling/certified_culling.h"
-#include "core/culling/visible_groups.h"
-#include "core/error/error.h"
+#include "cli/scene_culling.h"
 
 namespace scarp {
-
-namespace {
-
-std::unique_ptr<CullingMethod> method_named(const CullOptions& options, const LoadedScene& scene) {
-  if (options.method == "certified" && !scene.groups.has_certified())
-    throw Error(ErrorCode::kInput,
-                fmt::format("'{}': the scene has no certified regions, which --method certified "
-                            "needs; build it with --horizon certified, or give --method thesis",
-                            options.scene));
-  if (options.method != "thesis" && scene.groups.has_certified())
-    return std::make_unique<CertifiedCulling>(scene.groups.certified);
-  return std::make_unique<ThesisCulling>(scene.groups);
-}
-
-}  // namespace
 
 int run_cull(const CullOptions& options) {
   const LoadedScene scene(options.scene);
@@ -38,7 +20,7 @@ int run_cull(const CullOptions& options) {
     while (to_rad < from_rad) to_rad += 2 * M_PI;
     camera.view = ViewRange{from_rad, to_rad};
   }
-  const std::unique_ptr<CullingMethod> method = method_named(options, scene);
+  const std::unique_ptr<CullingMethod> method = culling_method(scene, options.method);
   const CullingAnswer answer = method->visible(camera);
   std::uint64_t drawn = 0, orphans = 0;
   for (const GroupIndex group : answer.visible_groups) drawn += scene.groups.nodes[group].triangles;

@@ -94,6 +94,35 @@ MapPoint to_map_point(const TypedPosition& typed, const std::string& crs, const 
   return convert_coordinates(crs, frame.description().crs_wkt, point);
 }
 
+std::optional<double> parse_duration(const std::string& text) {
+  std::string_view rest = text;
+  const auto value = take_number(rest);
+  double unit_s = 0;
+  if (take(rest, "s"))
+    unit_s = 1;
+  else if (take(rest, "min"))
+    unit_s = 60;
+  else if (take(rest, "h"))
+    unit_s = 3600;
+  if (!value || unit_s == 0 || !rest.empty() || !(*value > 0)) return {};
+  return *value * unit_s;
+}
+
+void take_budget(const std::string& text, Budget& budget) {
+  if (const auto seconds = parse_duration(text)) {
+    budget.seconds = seconds;
+    return;
+  }
+  std::string_view rest = text;
+  const auto value = take_number(rest);
+  if (!value || !(*value > 0) || rest != "B/triangle")
+    throw Error(ErrorCode::kUsage,
+                fmt::format("--budget {}: not understood; a time such as 10s, 5min or 1h, or bytes "
+                            "such as 4B/triangle were expected",
+                            text));
+  budget.bytes_per_triangle = value;
+}
+
 std::uint64_t parse_bytes(const std::string& text) {
   std::string_view rest = text;
   const auto value = take_number(rest);

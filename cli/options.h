@@ -31,6 +31,25 @@ struct TypedPosition {
 /// What guides the growth of groups.
 enum class Growth { kHiddenTogether, kBreadthFirst };
 
+/// What a scene is built to be culled by.
+enum class Hiding {
+  kCertified,  ///< regions that are never wrong on the unsafe side
+  kStewart,    ///< horizons of the vertices, as published
+  kBoth,
+};
+inline bool has_certified(Hiding hiding) {
+  return hiding != Hiding::kStewart;
+}
+inline bool has_stewart(Hiding hiding) {
+  return hiding != Hiding::kCertified;
+}
+
+/// What certified regions may cost.
+struct Budget {
+  std::optional<double> seconds;             ///< of certifying, on this machine
+  std::optional<double> bytes_per_triangle;  ///< of what is stored
+};
+
 struct BuildOptions {
   CommonOptions common;
   DemOptions dem;
@@ -40,9 +59,14 @@ struct BuildOptions {
   std::optional<std::uint32_t> vertices;
   std::string footprints_file;
   std::string footprints_height_field = "height";
-  std::string horizon = "stewart";  ///< or "certified": that, and certified regions
-  int sectors = 16;
-  int subsectors = 4;
+  Hiding horizon = Hiding::kCertified;
+  /// Of certified regions where there are any: as many as kCertifiedBytes hold; of horizons
+  /// otherwise: 16.
+  std::optional<int> sectors;
+  std::optional<int> subsectors;  ///< of horizons; 4
+  std::optional<int> fans;        ///< of certified regions
+  std::optional<double> patch;    ///< of certified regions
+  Budget budget;                  ///< of certified regions
   Growth growth = Growth::kHiddenTogether;
   int group_triangles = 128;
   std::uint32_t min_group_triangles = 30;
@@ -111,6 +135,16 @@ struct VerifyOptions {
   std::uint64_t seed = 1;
 };
 
+struct CompareOptions {
+  CommonOptions common;
+  std::string scene;
+  std::string output;  ///< folder
+  int eyes = 4;
+  std::vector<double> heights_m = {2, 50, 300, 1000};
+  std::uint64_t seed = 1;
+  double limit_s = 300;
+};
+
 struct PreviewCommandOptions {
   CommonOptions common;
   std::string scene;
@@ -140,6 +174,12 @@ double parse_frequency(const std::string& text);
 /// The typed place in the CRS of the data, converted from `crs` where that is given; its height as
 /// typed. Throws Error{kInput}.
 MapPoint to_map_point(const TypedPosition& typed, const std::string& crs, const GeoFrame& frame);
+
+/// Reads "10s", "5min" or "1h", or "4B/triangle", into what it limits. Throws Error{kUsage}.
+void take_budget(const std::string& text, Budget& budget);
+
+/// Reads "10s", "5min" or "1h" as seconds, or nothing where it is not understood.
+std::optional<double> parse_duration(const std::string& text);
 
 /// Reads "2GiB", "512M", "1000000" and the like as bytes. Throws Error{kUsage}.
 std::uint64_t parse_bytes(const std::string& text);

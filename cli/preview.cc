@@ -7,6 +7,7 @@
 #include "cli/commands.h"
 #include "cli/loaded_scene.h"
 #include "cli/picture_size.h"
+#include "cli/scene_culling.h"
 #include "core/culling/visible_groups.h"
 #include "core/error/error.h"
 #include "tiles/layers/png_image.h"
@@ -48,7 +49,7 @@ int run_preview(const PreviewCommandOptions& options) {
   if (options.observer) {
     const MapPoint at = resolve(*options.observer, options.crs, scene.frame, scene.index);
     shape.eye = GeoFrame::Placer(scene.frame).place(at);
-    culled = culled_triangles(scene.groups, visible_groups(scene.groups, {*shape.eye, {}}));
+    culled = culled_triangles(scene.groups, culling_method(scene, "")->visible({*shape.eye, {}}));
     shape.culled = culled;
   }
   const bool perspective = options.three_d || options.camera;

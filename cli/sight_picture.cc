@@ -8,38 +8,18 @@
 #include <cmath>
 #include <limits>
 
+#include "cli/svg.h"
+
 namespace scarp {
 namespace {
 
 constexpr double kWidthPx = 1200, kHeightPx = 600;
 constexpr double kLeftPx = 84, kRightPx = 1172, kTopPx = 132, kBottomPx = 516;
 
-constexpr char kGroundFill[] = "#cdbf9f", kGroundStroke[] = "#6f5c3b", kInk[] = "#2b2f36";
-constexpr char kFaint[] = "#dfe3e8", kSoft[] = "#69707a", kZone[] = "#3b7dd8";
+constexpr char kGroundFill[] = "#cdbf9f", kGroundStroke[] = "#6f5c3b", kZone[] = "#3b7dd8";
 
 const char* colour_of(Sight sight) {
   return sight == Sight::kVisible ? "#1f8a4c" : sight == Sight::kHidden ? "#c8321f" : "#8a6d1f";
-}
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '<')
-      out += "&lt;";
-    else if (c == '&')
-      out += "&amp;";
-    else
-      out += c;
-  }
-  return out;
-}
-
-/// A round step, 1, 2 or 5 times a power of ten, that divides a range into about `parts`.
-double round_step(double range, double parts) {
-  const double rough = range / parts, power = std::pow(10, std::floor(std::log10(rough)));
-  for (const double factor : {1.0, 2.0, 5.0})
-    if (rough <= factor * power) return factor * power;
-  return 10 * power;
 }
 
 class Drawing {
@@ -62,11 +42,7 @@ class Drawing {
   }
 
   std::string draw() {
-    svg_ = fmt::format(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" "
-        "height=\"{1}\" font-family=\"Helvetica, Arial, sans-serif\" font-size=\"14\">\n"
-        "<rect width=\"{0}\" height=\"{1}\" fill=\"#ffffff\"/>\n",
-        kWidthPx, kHeightPx);
+    svg_ = svg_begin(kWidthPx, kHeightPx);
     axes();
     fresnel_zone();
     ground();
@@ -74,15 +50,15 @@ class Drawing {
     end_mark(profile_.line.front(), profile_.eye_foot_m, "eye", true);
     end_mark(profile_.line.back(), profile_.target_foot_m, "target", false);
     blocker();
-    text(kLeftPx, 34, "start", kInk, 20, profile_.title);
+    text(kLeftPx, 34, "start", kInkColour, 20, profile_.title);
     double y = 58;
     for (const std::string& note : profile_.notes) {
-      text(kLeftPx, y, "start", kSoft, 14, note);
+      text(kLeftPx, y, "start", kSoftColour, 14, note);
       y += 20;
     }
     const double exaggeration =
         (far_m_ / (kRightPx - kLeftPx)) / ((high_m_ - low_m_) / (kBottomPx - kTopPx));
-    text(kLeftPx, kHeightPx - 14, "start", kSoft, 12,
+    text(kLeftPx, kHeightPx - 14, "start", kSoftColour, 12,
          fmt::format("Heights are as they are above the datum, {:.3g} times exaggerated{}.{}",
                      exaggeration,
                      profile_.flat_earth ? ""
@@ -113,11 +89,7 @@ class Drawing {
 
   void text(double x, double y, const char* anchor, const char* colour, int size,
             const std::string& words) {
-    svg_ += fmt::format(
-        "<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\" fill=\"{}\" font-size=\"{}\" "
-        "stroke=\"#ffffff\" "
-        "stroke-width=\"3\" paint-order=\"stroke\">{}</text>\n",
-        x, y, anchor, colour, size, escaped(words));
+    svg_ += svg_text(x, y, anchor, colour, size, words);
   }
 
   void axes() {
@@ -127,25 +99,25 @@ class Drawing {
     for (double d = 0; d * unit_m <= far_m_ * (1 + 1e-9); d += step) {
       const double x = x_px(d * unit_m);
       svg_ += fmt::format("<path d=\"M{0:.1f} {1}V{2}\" stroke=\"{3}\"/>\n", x, kTopPx, kBottomPx,
-                          kFaint);
-      text(x, kBottomPx + 20, "middle", kInk, 13, fmt::format("{:.6g}", d));
+                          kFaintColour);
+      text(x, kBottomPx + 20, "middle", kInkColour, 13, fmt::format("{:.6g}", d));
     }
-    text((kLeftPx + kRightPx) / 2, kBottomPx + 42, "middle", kInk, 14,
+    text((kLeftPx + kRightPx) / 2, kBottomPx + 42, "middle", kInkColour, 14,
          in_km ? "distance along the ground, km" : "distance along the ground, m");
     const double rise = round_step(high_m_ - low_m_, 7);
     for (double h = std::ceil(low_m_ / rise) * rise; h <= high_m_; h += rise) {
       const double y = y_px(h);
       svg_ += fmt::format("<path d=\"M{0} {1:.1f}H{2}\" stroke=\"{3}\"/>\n", kLeftPx, y, kRightPx,
-                          kFaint);
+                          kFaintColour);
       // A zero that is not quite one would print as -0.
-      text(kLeftPx - 8, y + 4.5, "end", kInk, 13,
+      text(kLeftPx - 8, y + 4.5, "end", kInkColour, 13,
            fmt::format("{:.6g}", std::abs(h) < rise / 2 ? 0 : h));
     }
     const double middle = (kTopPx + kBottomPx) / 2;
     svg_ += fmt::format(
         "<text transform=\"translate(22 {:.1f}) rotate(-90)\" text-anchor=\"middle\" "
         "fill=\"{}\">height, m</text>\n",
-        middle, kInk);
+        middle, kInkColour);
   }
 
   void ground() {
@@ -164,7 +136,7 @@ class Drawing {
       i = end;
     }
     svg_ += fmt::format("<path d=\"M{0} {1}V{2}H{3}\" fill=\"none\" stroke=\"{4}\"/>\n", kLeftPx,
-                        kTopPx, kBottomPx, kRightPx, kInk);
+                        kTopPx, kBottomPx, kRightPx, kInkColour);
   }
 
   void fresnel_zone() {
@@ -209,10 +181,10 @@ class Drawing {
     const double x = x_px(end.distance_m), y = y_px(end.height_m);
     if (foot_m)
       svg_ += fmt::format("<path d=\"M{:.2f} {:.2f}V{:.2f}\" stroke=\"{}\" stroke-width=\"2\"/>\n",
-                          x, y_px(*foot_m), y, kInk);
-    svg_ +=
-        fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"4.5\" fill=\"{}\"/>\n", x, y, kInk);
-    text(at_left ? x + 8 : x - 8, y - 9, at_left ? "start" : "end", kInk, 14, label);
+                          x, y_px(*foot_m), y, kInkColour);
+    svg_ += fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"4.5\" fill=\"{}\"/>\n", x, y,
+                        kInkColour);
+    text(at_left ? x + 8 : x - 8, y - 9, at_left ? "start" : "end", kInkColour, 14, label);
   }
 
   void blocker() {

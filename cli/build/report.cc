@@ -6,15 +6,15 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "cli/verify.h"
+
 namespace scarp {
 namespace {
 
 nlohmann::json group_sizes(const Groups& groups) {
-  std::vector<std::uint32_t> sizes;
-  for (GroupIndex g = 0; g < groups.leaf_count; ++g) sizes.push_back(groups.nodes[g].triangles);
-  std::sort(sizes.begin(), sizes.end());
-  if (sizes.empty()) return nullptr;
-  return {{"least", sizes.front()}, {"median", sizes[sizes.size() / 2]}, {"most", sizes.back()}};
+  if (groups.leaf_count == 0) return nullptr;
+  const GroupFigures figures = figures_of(groups);
+  return {{"least", figures.least}, {"median", figures.median}, {"most", figures.most}};
 }
 
 }  // namespace
@@ -30,8 +30,23 @@ std::string growth_name(Growth growth) {
   return growth == Growth::kBreadthFirst ? "breadth-first" : "hidden-together";
 }
 
+std::string horizon_name(Hiding horizon) {
+  return horizon == Hiding::kCertified ? "certified"
+         : horizon == Hiding::kStewart ? "stewart"
+                                       : "both";
+}
+
+SectorLayout stewart_layout(const BuildOptions& options) {
+  SectorLayout layout;
+  if (!has_certified(options.horizon)) layout.count = options.sectors.value_or(layout.count);
+  layout.subsectors = options.subsectors.value_or(layout.subsectors);
+  return layout;
+}
+
 nlohmann::json build_report(const BuildOptions& options, const Dem& dem, const Mesh& mesh,
                             const MeshOptions& mesh_options, const Groups& groups,
+                            const std::optional<CertifiedSettings>& certified,
+                            const std::optional<BudgetChoice>& budget,
                             const GroupingReport& grouping, const MapPoint& observer,
                             const std::vector<StageCost>& stages) {
   nlohmann::json report;
@@ -47,9 +62,7 @@ nlohmann::json build_report(const BuildOptions& options, const Dem& dem, const M
       {"refraction", frame.refraction},
       {"heights", frame.geoid_file.empty() ? "taken as ellipsoidal" : "geoid undulation added"},
       {"height_unit", dem.height_unit},
-      {"sectors", options.sectors},
-      {"subsectors", options.subsectors},
-      {"horizon", options.horizon},
+      {"horizon", horizon_name(options.horizon)},
       {"growth", growth_name(options.growth)},
       {"group_triangles", options.group_triangles},
       {"min_group_triangles", options.min_group_triangles},
@@ -68,12 +81,19 @@ nlohmann::json build_report(const BuildOptions& options, const Dem& dem, const M
                       {"orphans", grouping.orphans},
                       {"passes", grouping.passes},
                       {"triangles_of_a_group", group_sizes(groups)}};
-  if (groups.has_certified()) {
-    const CertifiedRegions& regions = groups.certified;
-    report["certified"] = {{"sectors", regions.layout.sectors},
-                           {"bytes", regions.groups.size() * sizeof(CertifiedGroup) +
-                                         regions.steps.size() * sizeof(SectorSteps)}};
+  if (has_stewart(options.horizon)) {
+    const SectorLayout layout = stewart_layout(options);
+    report["stewart"] = {{"sectors", layout.count}, {"subsectors", layout.subsectors}};
   }
+  if (certified)
+    report["certified"] = {{"sectors", certified->sectors},
+                           {"fans", certified->fans},
+                           {"patch", certified->patch},
+                           {"bytes", certified_bytes(groups.certified)}};
+  if (budget)
+    report["certified"]["budget"] = {{"seconds", budget->seconds},
+                                     {"measured_s", budget->measured_s},
+                                     {"predicted_s", budget->predicted_s}};
   for (const StageCost& stage : stages)
     report["stages"].push_back({{"name", stage.name},
                                 {"seconds", stage.seconds},

@@ -16,7 +16,9 @@ constexpr std::size_t kBlock = 64;
 /// Relative allowance for the rounding of a circle's distance from the border of the view.
 constexpr double kViewRounding = 0x1p-30;
 
-/// What a view shows, as the two half-planes left of its right border and right of its left one.
+/// What a view shows, as the two half-planes left of its right border and right of its left one,
+/// and where it is convex the half-plane ahead: for a circle the two of a narrow view leave much of
+/// what is behind the eye.
 class ViewWedge {
  public:
   ViewWedge(const Position& eye, const ViewRange& view) : eye_(eye) {
@@ -27,6 +29,8 @@ class ViewWedge {
     is_convex_ = width_rad <= std::numbers::pi;
     from_x_ = std::cos(view.from_rad), from_y_ = std::sin(view.from_rad);
     to_x_ = std::cos(view.from_rad + width_rad), to_y_ = std::sin(view.from_rad + width_rad);
+    const double middle_rad = view.from_rad + width_rad / 2;
+    ahead_x_ = std::cos(middle_rad), ahead_y_ = std::sin(middle_rad);
   }
 
   bool may_show(const CertifiedGroup& group) const {
@@ -36,13 +40,14 @@ class ViewWedge {
         static_cast<double>(group.radius_m) + (std::abs(x_m) + std::abs(y_m)) * kViewRounding;
     const bool left_of_from = from_x_ * y_m - from_y_ * x_m >= -reach_m;
     const bool right_of_to = to_y_ * x_m - to_x_ * y_m >= -reach_m;
-    return is_convex_ ? left_of_from && right_of_to : left_of_from || right_of_to;
+    if (!is_convex_) return left_of_from || right_of_to;
+    return left_of_from && right_of_to && ahead_x_ * x_m + ahead_y_ * y_m >= -reach_m;
   }
 
  private:
   Position eye_;
   bool shows_all_, is_convex_;
-  double from_x_, from_y_, to_x_, to_y_;
+  double from_x_, from_y_, to_x_, to_y_, ahead_x_, ahead_y_;
 };
 
 /// A camera as many groups see it: arrays, so that the arithmetic runs side by side.

@@ -10,4 +10,9 @@ SectorAxis sector_axis(const SectorLayout& layout, std::int32_t sector) {
   return {std::cos(azimuth_rad), std::sin(azimuth_rad)};
 }
 
+HorizonTable no_horizons(std::size_t vertices) {
+  constexpr SectorLayout kFewest{4, 1};
+  return {kFewest, std::vector<VertexIndex>(vertices * kFewest.count, kNone)};
+}
+
 }  // namespace scarp

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -39,5 +40,9 @@ struct HorizonTable {
                           static_cast<std::size_t>(sector)];
   }
 };
+
+/// A table in which no vertex has a horizon in any of four sectors: nothing is hidden as far as it
+/// tells. For groups whose regions are not made from horizons of vertices.
+HorizonTable no_horizons(std::size_t vertices);
 
 }  // namespace scarp

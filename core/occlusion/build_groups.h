@@ -15,7 +15,8 @@ struct GroupingReport {
 };
 
 /// HiddenTogetherOptions::compactness for regions of method `stewart`: they are intersections over
-/// all of a group's vertices and lose more by distance than by what is seen.
+/// all of a group's vertices and lose more by distance than by what is seen. Certified regions lose
+/// less by distance: the usual one is theirs.
 inline constexpr double kCompactnessForStewart = 4;
 
 /// Groups that are hidden together and the tree above them, from a surface and its horizons.

@@ -25,24 +25,18 @@
 #include "core/occlusion/build_groups.h"
 #include "core/occlusion/group_tree.h"
 #include "core/occlusion/hidden_together.h"
-#include "core/occlusion/splitmix64.h"
 #include "core/occlusion/squares.h"
 #include "core/sight/triangle_sight.h"
 #include "core/threads/parallel_for.h"
-#include "ingest/dem/dem.h"
-#include "ingest/mesh/mesh.h"
-#include "tests/support/dem_list.h"
-#include "tests/support/shared_data.h"
+#include "tests/judge/listed_mesh.h"
+#include "tests/support/eyes_over_ground.h"
 
 namespace scarp {
 namespace {
 
-constexpr std::array<double, 4> kHeightsM = {2, 50, 300, 1000};
 constexpr double kLeastShare = 0.05;
-/// Not the seed that groups are grown with.
-constexpr std::uint64_t kEyeSeed = 7;
-
-using Shares = std::array<double, kHeightsM.size()>;
+using test::for_each_eye;
+using Shares = std::array<double, test::kEyeHeightsM.size()>;
 
 struct Settings {
   std::uint32_t vertices = 25'000;
@@ -56,35 +50,11 @@ double cpu_seconds() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
 
-std::optional<Tin> mesh_of(const test::ListedDem& listed, std::uint32_t vertices) {
-  const auto path = test::shared_data(listed.file);
-  if (!path) return {};
-  DemOptions dem;
-  if (listed.flat) dem.earth = Earth::kFlat;
-  dem.nodata = listed.nodata;
-  MeshOptions options;
-  options.vertex_budget = vertices;
-  return mesh_samples(place_samples(read_dem({*path}, dem, {})), options, {}).tin;
-}
-
 std::vector<std::uint32_t> sizes_of(const LeafGroups& leaves) {
   std::vector<std::uint32_t> sizes(leaves.count, 0);
   for (const GroupIndex g : leaves.group_of_triangle)
     if (g != kNone) ++sizes[g];
   return sizes;
-}
-
-/// Calls visit(height index, eye) for the same eyes each time.
-template <class Visit>
-void for_each_eye(const Tin& tin, int eyes, Visit visit) {
-  for (std::size_t h = 0; h < kHeightsM.size(); ++h) {
-    SplitMix64 random(kEyeSeed);
-    for (int i = 0; i < eyes; ++i) {
-      Position eye = tin.vertices[random.below(tin.vertices.size())];
-      eye.z_m += kHeightsM[h];
-      visit(h, eye);
-    }
-  }
 }
 
 /// Shares of all triangles that are hidden, and that are in hidden groups of each partition.
@@ -180,7 +150,7 @@ void print_row(const nlohmann::json& row) {
   const nlohmann::json& hidden = row["hidden_groups"];
   std::string text =
       fmt::format("| {} | {} ", row["dem"].get<std::string>(), row["triangles"].get<std::size_t>());
-  for (std::size_t h = 0; h < kHeightsM.size(); ++h)
+  for (std::size_t h = 0; h < test::kEyeHeightsM.size(); ++h)
     text += fmt::format("| {} / {} = {} ", number(hidden["crystals"][h]),
                         number(hidden["squares"][h]), number(hidden["ratios"][h]));
   text += fmt::format("| {} ", number(hidden["mean_ratio"]));
@@ -216,7 +186,7 @@ int run(const Settings& settings) {
         settings.regions ? "| stewart " : "", settings.regions ? "---|" : "");
   for (const test::ListedDem& listed : test::kListedDems) {
     if (!settings.dem.empty() && settings.dem != listed.name) continue;
-    const auto tin = mesh_of(listed, settings.vertices);
+    const auto tin = test::mesh_of(listed, settings.vertices);
     if (!tin) {
       fmt::print(stderr, "left out, shared data not found: {}\n", listed.file);
       continue;

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "cli/build/budget.h"
 #include "tests/support/run_scarp.h"
 #include "tests/support/temp_folder.h"
 
@@ -29,6 +30,9 @@ std::set<std::string> listing(const std::filesystem::path& folder) {
   return names;
 }
 
+/// What the scenes of these tests are built with: both methods, as coarsely as they can be.
+constexpr char kQuick[] = " --max-error 40 --horizon both --fans 8 --patch 2 ";
+
 /// One scene of the Jacksboro fault for all tests that only read it.
 class BuiltScene : public testing::Test {
  protected:
@@ -38,7 +42,7 @@ class BuiltScene : public testing::Test {
     dem_ = test::jacksboro_vrt(folder_->folder().string());
     if (dem_.empty()) return;
     scene_ = folder_->path("a.scene");
-    built_ = run_scarp("$SCARP build " + dem_ + " -o " + scene_ + " --max-error 25 --json");
+    built_ = run_scarp("$SCARP build " + dem_ + " -o " + scene_ + kQuick + "--json");
   }
   static void TearDownTestSuite() { delete folder_; }
 
@@ -58,7 +62,7 @@ TEST_F(BuiltScene, ReportTellsWhatWasDone) {
   EXPECT_EQ(report["inputs"][0]["name"], "jacksboro.vrt");
   EXPECT_EQ(report["raster"]["known_samples"], 403 * 344);
   EXPECT_GT(report["mesh"]["vertices"], 1000);
-  EXPECT_LE(report["mesh"]["error_over_surface_m"], 25);
+  EXPECT_LE(report["mesh"]["error_over_surface_m"], 40);
   EXPECT_GT(report["groups"]["groups"], 10);
   std::set<std::string> stages;
   for (const json& stage : report["stages"]) {
@@ -66,8 +70,18 @@ TEST_F(BuiltScene, ReportTellsWhatWasDone) {
     EXPECT_GE(stage["seconds"], 0);
     EXPECT_GT(stage["peak_memory_bytes"], 1 << 20);
   }
-  EXPECT_EQ(stages, (std::set<std::string>{"read", "place", "mesh", "horizons", "groups", "layers",
-                                           "preview"}));
+  EXPECT_EQ(stages, (std::set<std::string>{"read", "place", "mesh", "horizons", "groups", "certify",
+                                           "verify", "layers", "preview"}));
+  EXPECT_EQ(report["certified"]["fans"], 8);
+  EXPECT_LE(report["certified"]["bytes"], 16 * report["mesh"]["triangles"].get<double>());
+  ASSERT_EQ(report["verify"].size(), 4U);  // two methods, two heights
+  for (const json& row : report["verify"]) {
+    EXPECT_GT(row["hidden"], 0);
+    EXPECT_LE(row["triangles"], 3 * report["mesh"]["triangles"].get<double>());
+    if (row["method"] == "certified") {
+      EXPECT_EQ(row["falsely_culled"], 0);
+    }
+  }
   EXPECT_TRUE(report["versions"].contains("gdal"));
 }
 
@@ -145,10 +159,9 @@ TEST_F(BuiltScene, SameBitsForAnyThreadCount) {
   const json once = read_json(scene_ + "/scene.json");
   for (const char* threads : {"1", "5"}) {
     const std::string other = folder_->path(std::string("threads") + threads);
-    ASSERT_EQ(
-        run_scarp("$SCARP build " + dem_ + " -o " + other + " --max-error 25 --threads " + threads)
-            .exit_code,
-        0);
+    ASSERT_EQ(run_scarp("$SCARP build " + dem_ + " -o " + other + kQuick + "--threads " + threads)
+                  .exit_code,
+              0);
     const json again = read_json(other + "/scene.json");
     EXPECT_EQ(again["tiles"], once["tiles"]);
     for (const json& layer : again["layers"])
@@ -166,9 +179,15 @@ TEST_F(BuiltScene, VerifyCountsAddUp) {
   ASSERT_EQ(run.exit_code, 0) << run.errors;
   const json counts = json::parse(run.output);
   const std::uint64_t triangles = read_json(scene_ + "/report.json")["mesh"]["triangles"];
-  ASSERT_EQ(counts.size(), 2U);
+  ASSERT_EQ(counts.size(), 4U);
   for (const json& c : counts) {
-    EXPECT_EQ(c["method"], "thesis");
+    EXPECT_EQ(c["method"], &c - &counts[0] < 2 ? "thesis" : "certified");
+    if (c["method"] == "certified") {
+      EXPECT_EQ(c["falsely_culled"], 0);
+      EXPECT_LE(c["culled"], c["in_hidden_groups"]);
+      EXPECT_LE(c["bytes_per_triangle"], 16);
+      EXPECT_EQ(c["orphans"], 0);
+    }
     EXPECT_EQ(c["eyes"], 2);
     EXPECT_EQ(c["triangles"], 2 * triangles);
     EXPECT_LE(c["in_hidden_groups"], c["hidden"]);
@@ -198,6 +217,74 @@ TEST_F(BuiltScene, CullAnswersInBothCrsSpellingsAndWithAView) {
   EXPECT_GT(narrow["visible_groups"].size(), 0U);
   const std::set<int> every = all["visible_groups"].get<std::set<int>>();
   for (const int group : narrow["visible_groups"]) EXPECT_TRUE(every.count(group));
+}
+
+TEST_F(BuiltScene, CullTakesCertifiedWhereTheSceneHasItAndRefusesWhatItHasNot) {
+  const std::string at = " --camera=-84.2,36.6,2 --json";
+  const auto cull = [&](const std::string& scene, const std::string& method) {
+    const RunResult run = run_scarp("$SCARP cull " + scene + at + method);
+    EXPECT_EQ(run.exit_code, 0) << run.errors;
+    return run.exit_code == 0 ? json::parse(run.output) : json();
+  };
+  EXPECT_EQ(cull(scene_, "")["method"], "certified");
+  EXPECT_EQ(cull(scene_, ""), cull(scene_, " --method certified"));
+  const json thesis = cull(scene_, " --method thesis");
+  EXPECT_EQ(thesis["method"], "thesis");
+  EXPECT_NE(thesis["visible_groups"], cull(scene_, "")["visible_groups"]);
+
+  const std::string certified = folder_->path("certified"), stewart = folder_->path("stewart");
+  const std::string build = "$SCARP build " + dem_ + " --max-error 200 -o ";
+  ASSERT_EQ(run_scarp(build + certified + " --fans 8 --patch 4").exit_code, 0);
+  ASSERT_EQ(run_scarp(build + stewart + " --horizon stewart").exit_code, 0);
+  EXPECT_FALSE(std::filesystem::exists(certified + "/tiles/0/0/0.horizon"));
+  for (const std::string& scene : {certified, stewart})
+    EXPECT_EQ(run_scarp("$SCARP check " + scene).exit_code, 0);
+  EXPECT_EQ(cull(certified, "")["method"], "certified");
+  EXPECT_EQ(cull(stewart, "")["method"], "thesis");
+  for (const auto& [scene, method] :
+       {std::pair{certified, "thesis"}, std::pair{stewart, "certified"}}) {
+    const RunResult run = run_scarp("$SCARP cull " + scene + at + " --method " + method);
+    EXPECT_EQ(run.exit_code, 1);
+    EXPECT_NE(run.errors.find("build it with --horizon both"), std::string::npos) << run.errors;
+    EXPECT_EQ(std::count(run.errors.begin(), run.errors.end(), '\n'), 1);
+    const json judged =
+        json::parse(run_scarp("$SCARP verify " + scene + " --eyes 1 --heights 2 --json").output);
+    ASSERT_EQ(judged.size(), 1U);
+    EXPECT_NE(judged[0]["method"], method);
+  }
+}
+
+TEST_F(BuiltScene, WhatABudgetChoosesIsRepeatedByExplicitFlags) {
+  const std::string chosen = folder_->path("chosen"), repeated = folder_->path("repeated");
+  const std::string build = "$SCARP build " + dem_ + " --max-error 150 --json -o ";
+  const RunResult run = run_scarp(build + chosen + " --budget 1s --budget 4B/triangle");
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  const json report = json::parse(run.output), scene = read_json(chosen + "/scene.json");
+  EXPECT_LE(report["certified"]["bytes"], 4 * report["mesh"]["triangles"].get<double>());
+  EXPECT_EQ(report["certified"]["budget"]["seconds"], 1);
+  EXPECT_GT(report["certified"]["budget"]["predicted_s"], 0);
+  EXPECT_EQ(report["certified"]["fans"], scene["parameters"]["fans"]);
+  const auto flag = [&](const std::string& name) {
+    return " --" + name + " " + scene["parameters"][name].dump();
+  };
+  ASSERT_EQ(run_scarp(build + repeated + flag("fans") + flag("sectors") + flag("patch")).exit_code,
+            0);
+  const json again = read_json(repeated + "/scene.json");
+  EXPECT_EQ(again["tiles"], scene["tiles"]);
+  EXPECT_EQ(again["parameters"], scene["parameters"]);
+}
+
+TEST(Budget, IsKeptToByTheMostFansThatFit) {
+  const CertifyCost cost{1, 0.1, 0.5};  // base, each fan, measuring
+  for (const double seconds : {7.0, 10.0, 60.0}) {
+    const int fans = fans_within(seconds, cost);
+    EXPECT_EQ(fans % 8, 0);
+    EXPECT_LE(cost.measured_s + cost.at(fans), seconds);
+    EXPECT_GT(cost.measured_s + cost.at(fans + 8), kPlannedShare * seconds);
+  }
+  EXPECT_EQ(fans_within(0.1, cost), kFewestFans);
+  EXPECT_EQ(fans_within(1e9, cost), kMostFansOfBudget);
+  EXPECT_EQ(fans_within(1, CertifyCost{}), kMostFansOfBudget);
 }
 
 TEST_F(BuiltScene, PreviewDrawsPicturesOfTheAskedWidth) {
@@ -265,7 +352,21 @@ TEST_F(BuiltScene, RefusalsAreOneLineAndLeaveNothingBehind) {
       {"build " + dem + " -o " + f + "/x --max-error 1 --vertices 9", 2, "excludes"},
       {"build " + dem + " -o " + f + "/x --max-error -1", 2, "--max-error"},
       {"build " + dem + " -o " + f + "/x --sectors 3", 2, "--sectors"},
+      {"build " + dem + " -o " + f + "/x --sectors 12", 2, "give 16"},
+      {"build " + dem + " -o " + f + "/x --fans 12", 2, "--fans"},
+      {"build " + dem + " -o " + f + "/x --fans 16 --horizon stewart", 2, "--horizon certified"},
+      {"build " + dem + " -o " + f + "/x --patch 2 --horizon stewart", 2, "--horizon certified"},
+      {"build " + dem + " -o " + f + "/x --subsectors 2", 2, "--horizon stewart"},
+      {"build " + dem + " -o " + f + "/x --budget 10", 2, "10s"},
+      {"build " + dem + " -o " + f + "/x --budget -1s", 2, "10s"},
+      {"build " + dem + " -o " + f + "/x --budget 4B", 2, "4B/triangle"},
+      {"build " + dem + " -o " + f + "/x --budget 9s --fans 8", 2, "--fans"},
+      {"build " + dem + " -o " + f + "/x --budget 9B/triangle --sectors 8", 2, "--sectors"},
+      {"build " + dem + " -o " + f + "/x --budget 9s --horizon stewart", 2, "--budget"},
+      {"build " + dem + " -o " + f + "/x --budget 0.1B/triangle --max-error 99", 2,
+       "the fewest sectors take"},
       {"build " + dem + " -o " + f + "/x --growth fast", 2, "--growth"},
+      {"build " + dem + " -o " + f + "/x --growth breadth-first", 2, "--horizon stewart"},
       {"build " + dem + " -o " + f + "/x --seeds 100", 2, "--growth breadth-first"},
       {"build " + dem + " -o " + f + "/x --max-groups 200", 2, "--growth breadth-first"},
       {"build", 2, "--help"},
@@ -291,7 +392,7 @@ TEST_F(BuiltScene, FullDiskIsOneLineAndLeavesNothingBehind) {
   // A limit on file sizes fails writes as a full disk does.
   const std::set<std::string> before = listing(folder_->folder());
   const RunResult run = run_scarp("trap '' XFSZ; ulimit -f 40; $SCARP build " + dem_ + " -o " +
-                                  folder_->path("x") + " --max-error 25");
+                                  folder_->path("x") + kQuick);
   EXPECT_EQ(run.exit_code, 1) << run.errors;
   EXPECT_EQ(std::count(run.errors.begin(), run.errors.end(), '\n'), 1) << run.errors;
   EXPECT_EQ(listing(folder_->folder()), before);
@@ -301,8 +402,10 @@ TEST_F(BuiltScene, GrowthIsRecordedAndGroupsLeaveNoOrphansUnlessPublished) {
   EXPECT_EQ(read_json(scene_ + "/report.json")["groups"]["orphans"], 0);
   EXPECT_EQ(read_json(scene_ + "/scene.json")["parameters"]["growth"], "hidden-together");
   const std::string other = folder_->path("breadth.scene");
-  const RunResult run = run_scarp("$SCARP build " + dem_ + " -o " + other +
-                                  " --max-error 25 --growth breadth-first --seeds 40 --json");
+  const RunResult run =
+      run_scarp("$SCARP build " + dem_ + " -o " + other +
+                " --max-error 25 --growth breadth-first --seeds 40 --horizon stewart "
+                "--json");
   ASSERT_EQ(run.exit_code, 0) << run.errors;
   EXPECT_GT(json::parse(run.output)["groups"]["orphans"], 0);
   const json parameters = read_json(other + "/scene.json")["parameters"];
@@ -312,9 +415,12 @@ TEST_F(BuiltScene, GrowthIsRecordedAndGroupsLeaveNoOrphansUnlessPublished) {
 
 TEST_F(BuiltScene, OverwriteReplacesTheScene) {
   const std::string other = folder_->path("b.scene");
-  ASSERT_EQ(run_scarp("$SCARP build " + dem_ + " -o " + other + " --max-error 200").exit_code, 0);
   ASSERT_EQ(
-      run_scarp("$SCARP build " + dem_ + " -o " + other + " --vertices 500 --overwrite").exit_code,
+      run_scarp("$SCARP build " + dem_ + " -o " + other + " --max-error 200 --fans 8").exit_code,
+      0);
+  ASSERT_EQ(
+      run_scarp("$SCARP build " + dem_ + " -o " + other + " --vertices 500 --fans 8 --overwrite")
+          .exit_code,
       0);
   EXPECT_EQ(read_json(other + "/report.json")["mesh"]["vertices"], 500);
   EXPECT_EQ(run_scarp("$SCARP check " + other).exit_code, 0);
@@ -322,7 +428,8 @@ TEST_F(BuiltScene, OverwriteReplacesTheScene) {
 
 TEST(CommandLine, HelpAndVersion) {
   EXPECT_EQ(run_scarp("$SCARP --version").output, "scarp " SCARP_VERSION "\n");
-  for (const char* command : {"build", "cull", "verify", "preview", "sight", "horizon", "check"}) {
+  for (const char* command :
+       {"build", "cull", "verify", "compare", "preview", "sight", "horizon", "check"}) {
     const RunResult help = run_scarp(std::string("$SCARP ") + command + " --help");
     EXPECT_EQ(help.exit_code, 0);
     EXPECT_NE(help.output.find("Example"), std::string::npos) << command;

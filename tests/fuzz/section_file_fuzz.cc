@@ -1,5 +1,6 @@
 #include <cstring>
 
+#include "core/culling/certified_culling.h"
 #include "core/error/error.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/tiles/reseal.h"
@@ -35,7 +36,10 @@ void read_as_every_kind(const std::vector<std::byte>& bytes, Verify verify) {
     (void)read_sample_of_vertex(file);
   });
   read_or_refuse(bytes, verify, read_horizon);
-  read_or_refuse(bytes, verify, read_groups);
+  read_or_refuse(bytes, verify, [](const SectionFile& file) {
+    const Groups groups = read_groups(file);
+    if (groups.has_certified()) (void)CertifiedCulling(groups.certified).visible({{30, 70, 2}, {}});
+  });
 }
 
 }  // namespace
@@ -59,7 +63,9 @@ std::vector<std::vector<std::uint8_t>> fuzz_seeds() {
   for (const std::vector<std::byte>& bytes :
        {tin_writer(tin, samples).to_bytes(), tin_writer(Tin{}).to_bytes(),
         horizon_writer(test::small_horizons(tin)).to_bytes(),
-        groups_writer(test::small_groups(tin)).to_bytes(), groups_writer(Groups{}).to_bytes()}) {
+        groups_writer(test::small_groups(tin)).to_bytes(),
+        groups_writer(test::small_certified_groups(tin)).to_bytes(),
+        groups_writer(Groups{}).to_bytes()}) {
     std::vector<std::uint8_t> seed(bytes.size());
     std::memcpy(seed.data(), bytes.data(), bytes.size());
     seeds.push_back(std::move(seed));

@@ -56,6 +56,21 @@ inline Groups small_groups(const Tin& tin) {
   return groups;
 }
 
+/// The same with certified regions of eight sectors.
+inline Groups small_certified_groups(const Tin& tin) {
+  Groups groups = small_groups(tin);
+  CertifiedRegions& regions = groups.certified;
+  regions.layout = {8, 2};
+  regions.groups = {{5, -5, 3.5, 8.25F, -0.5F, 0.001F}, {15, -15, 4.25, 8.75F, 0.25F, 0}};
+  for (std::uint16_t i = 0; i < 16; ++i) {
+    const auto step = [&](int ring, int code) {
+      return static_cast<std::uint16_t>((ring << kSlopeBits) + code);
+    };
+    regions.steps.push_back({step(0, 0), step(i, 40 * i), step(i + 3, 7), step(i + 3, 1023)});
+  }
+  return groups;
+}
+
 inline SceneDescription small_description() {
   SceneDescription scene;
   scene.made_by = "scarp test";

@@ -63,6 +63,11 @@ void read_certified(Groups& groups, const SectionFile& file) {
   regions.steps = file.copy<std::uint8_t, SectorSteps>("cert_steps");
   if (const auto broken = check_certified(regions))
     file.fail(fmt::format("of the certified regions, {}", *broken));
+  // Cameras are looked up in float: a centre from which a square of a distance overflows has none.
+  for (std::size_t g = 0; g < regions.groups.size(); ++g)
+    if (std::abs(regions.groups[g].centre_x_m) > kLatticeReachM ||
+        std::abs(regions.groups[g].centre_y_m) > kLatticeReachM)
+      file.fail(fmt::format("group {} is centred beyond the lattice", g));
 }
 
 std::size_t region_count(const Groups& groups) {

@@ -4,6 +4,7 @@
 
 #include <functional>
 
+#include "core/culling/certified_culling.h"
 #include "core/error/error.h"
 #include "tests/tiles/limits.h"
 #include "tests/tiles/reseal.h"
@@ -39,6 +40,17 @@ std::vector<KindOfFile> kinds_of_file() {
        }},
       {"horizon", horizon_writer(test::small_horizons(tin)).to_bytes(),
        [](const SectionFile& file) { read_horizon(file); }},
+      {"certified", groups_writer(test::small_certified_groups(tin)).to_bytes(),
+       [](const SectionFile& file) {
+         // what is read without complaint can be asked: the sanitizers look on
+         const Groups groups = read_groups(file);
+         if (!groups.has_certified()) return;
+         CertifiedCulling culling(groups.certified);
+         for (const double x_m : {5.0, 30.0, -1e8})
+           for (const double y_m : {-5.0, 70.0, 1e8})
+             EXPECT_LE(culling.visible({{x_m, y_m, 2}, {}}).visible_groups.size(),
+                       groups.leaf_count);
+       }},
       {"groups", groups_writer(test::small_groups(tin)).to_bytes(), [](const SectionFile& file) {
          const Groups groups = read_groups(file);
          for (GroupIndex n = 0; n < groups.nodes.size(); ++n) {
@@ -291,6 +303,53 @@ TEST(GroupsFile, RoundTrip) {
   EXPECT_EQ(groups_writer(back).to_bytes(), bytes);
   EXPECT_TRUE(
       read_groups(SectionFile::from_memory(groups_writer(Groups{}).to_bytes(), "f")).nodes.empty());
+}
+
+TEST(GroupsFile, CertifiedRegionsRoundTrip) {
+  const Groups groups = test::small_certified_groups(test::grid_tin(4, 3));
+  const Bytes bytes = groups_writer(groups).to_bytes();
+  const Groups back = read_groups(SectionFile::from_memory(bytes, "f"));
+  ASSERT_TRUE(back.has_certified());
+  EXPECT_EQ(back.certified.layout, groups.certified.layout);
+  EXPECT_EQ(back.certified.steps, groups.certified.steps);
+  for (std::size_t g = 0; g < 2; ++g) {
+    const CertifiedGroup &read = back.certified.groups[g], &wrote = groups.certified.groups[g];
+    EXPECT_EQ(read.centre_x_m, wrote.centre_x_m);
+    EXPECT_EQ(read.centre_y_m, wrote.centre_y_m);
+    EXPECT_EQ(read.height_m, wrote.height_m);
+    EXPECT_EQ(read.radius_m, wrote.radius_m);
+    EXPECT_EQ(read.low_slope, wrote.low_slope);
+    EXPECT_EQ(read.slope_step, wrote.slope_step);
+  }
+  EXPECT_EQ(groups_writer(back).to_bytes(), bytes);
+  // A scene without them has none of their sections.
+  EXPECT_FALSE(SectionFile::from_memory(
+                   groups_writer(test::small_groups(test::grid_tin(4, 3))).to_bytes(), "f")
+                   .has("cert_layout"));
+}
+
+TEST(GroupsFile, RefusesCertifiedRegionsThatCannotBeAsked) {
+  const auto complains = [](const std::string& part,
+                            const std::function<void(CertifiedRegions&)>& damage) {
+    Groups groups = test::small_certified_groups(test::grid_tin(3, 3));
+    damage(groups.certified);
+    const std::string text = complaint(groups_writer(groups).to_bytes(), read_groups);
+    EXPECT_NE(text.find(part), std::string::npos) << part << " | " << text;
+  };
+  complains("sectors are not a multiple of 8", [](CertifiedRegions& r) { r.layout.sectors = 4; });
+  complains("ring bits", [](CertifiedRegions& r) { r.layout.ring_bits = 4; });
+  complains("row of steps", [](CertifiedRegions& r) { r.steps.pop_back(); });
+  complains("no proper circle", [](CertifiedRegions& r) { r.groups[1].radius_m = 0; });
+  complains("no proper circle", [](CertifiedRegions& r) { r.groups[0].low_slope = NAN; });
+  complains("no proper circle", [](CertifiedRegions& r) { r.groups[0].slope_step = -1; });
+  complains("no proper circle", [](CertifiedRegions& r) { r.groups[0].height_m = INFINITY; });
+  complains("rings of group 1", [](CertifiedRegions& r) {
+    r.steps[9] = {5 << kSlopeBits, 4 << kSlopeBits, 0, 0};
+  });
+  complains("group 0 is centred beyond",
+            [](CertifiedRegions& r) { r.groups[0].centre_x_m = 1e300; });
+  complains("group 1 is centred beyond",
+            [](CertifiedRegions& r) { r.groups[1].centre_y_m = -1e9; });
 }
 
 TEST(GroupsFile, RefusesWhatCannotBeWalked) {
