@@ -29,7 +29,7 @@ ComparisonOptions quick(std::int32_t fans, std::int32_t sectors) {
   options.hiding.fans = fans;
   options.hiding.sectors = sectors;
   options.scattered_eyes = 10;
-  options.searches = 16;
+  options.searches = 40;
   options.thesis_searches = 0;
   return options;
 }
@@ -131,11 +131,11 @@ void expect_certified_is_safe(std::int32_t fans, std::int32_t sectors) {
 }
 
 TEST(Stability, CertifiedIsNeverOnTheUnsafeSide) {
-  expect_certified_is_safe(64, 64);
+  expect_certified_is_safe(64, 40);
 }
 
 TEST(Stability, CertifiedIsNeverOnTheUnsafeSideWithFewFans) {
-  expect_certified_is_safe(8, 128);
+  expect_certified_is_safe(8, 40);
 }
 
 TEST(Stability, ComparisonSeesWhereTheThesisIsWrong) {

@@ -52,12 +52,14 @@ class Search {
 
   AdversarialReport run() {
     if (place_->triangles.empty()) return report_;
-    Spot at = random_.below(3) == 0 ? anywhere() : beyond_a_vertex();
-    bool found = look(at);
-    for (int step = 0; step < kClimbSteps; ++step) {
-      // Until something is hidden there is nothing to climb.
-      const Spot next = found ? near(at) : random_.below(2) == 0 ? anywhere() : beyond_a_vertex();
-      if (look(next)) at = next, found = true;
+    Spot best{};
+    bool found = false;
+    for (int step = 0; step < kProbes + kClimbSteps; ++step) {
+      const bool climbs = found && step >= kProbes;
+      const Spot spot = climbs                  ? near(best)
+                        : random_.below(3) == 0 ? anywhere()
+                                                : beyond_a_vertex();
+      if (look(spot)) best = spot, found = true;
     }
     return report_;
   }
@@ -126,12 +128,26 @@ class Search {
       return keep({group_, {eye.x_m, eye.y_m, *flip_m}, (true_m - *flip_m) / distance_m});
     }
     // One question tells most places that are no better from those that are.
-    const double room_m = report_.worst ? report_.worst->margin * distance_m : reach_m;
-    const double high_m = round_to_lattice(*flip_m + std::min(room_m, reach_m));
-    if (!(room_m > 0) || (report_.worst && unseen_at(high_m))) return false;
-    const double true_m =
-        highest(*flip_m, high_m, std::max(kLatticeStepM, room_m / 64), unseen_at).value_or(*flip_m);
-    return keep({group_, {eye.x_m, eye.y_m, *flip_m}, (true_m - *flip_m) / distance_m});
+    const double room_m =
+        std::min(report_.worst ? report_.worst->margin * distance_m : reach_m, reach_m);
+    if (!(room_m > 0) || (report_.worst && unseen_at(round_to_lattice(*flip_m + room_m))))
+      return false;
+    return keep({group_, {eye.x_m, eye.y_m, *flip_m}, least_rise_m(room_m, [&](double rise_m) {
+                                                        return !unseen_at(
+                                                            round_to_lattice(*flip_m + rise_m));
+                                                      }) / distance_m});
+  }
+
+  /// Least rise from which the group is seen, to a twentieth and never too small.
+  /// @param greatest_m  a rise from which it is, or one that is as good as never
+  template <class Seen>
+  static double least_rise_m(double greatest_m, Seen seen_from) {
+    double least_m = kLatticeStepM / 2;
+    while (greatest_m > 1.05 * least_m && greatest_m > kLatticeStepM) {
+      const double middle_m = std::sqrt(least_m * greatest_m);
+      (seen_from(middle_m) ? greatest_m : least_m) = middle_m;
+    }
+    return greatest_m;
   }
 
   bool keep(const BorderCamera& camera) {

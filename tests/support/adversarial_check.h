@@ -35,18 +35,18 @@ using HidesGroup = std::function<bool(GroupIndex, const Position&)>;
 
 /// Looks for cameras that a method hides from a group which the judge sees from there.
 ///
-/// Each search takes a random group and a place for a camera: anywhere around the group, or beyond
-/// a vertex of the mesh as seen from the group, where the answer is close. There the height at
-/// which the method's answer flips is found by bisection, and the judge asked just below it about
-/// every triangle of the group. Then the place climbs, by random steps of all sizes, towards where
-/// the judge is nearest to disagreeing.
+/// Each search takes a random group and some places for a camera: anywhere around the group, or
+/// beyond a vertex of the mesh as seen from the group, where the answer is close. There the height
+/// at which the method's answer flips is found by bisection, and the judge asked just below it
+/// about every triangle of the group. Then the best of the places climbs, by random steps of all
+/// sizes, towards where the judge is nearest to disagreeing.
 ///
 /// @param group_of_triangle  [triangles], kNone where a triangle is in no group
 /// @param hides              the method
-/// @param searches           groups and places tried, kClimbSteps more cameras for each
+/// @param searches           of kProbes + kClimbSteps cameras each
 /// Requires a TIN for which check_tin finds nothing. Same bits for any thread count.
-/// Cost: a search judges a group about kClimbSteps times; on scenes of some hundred triangles in
-/// groups of 8 that is about a millisecond.
+/// Cost: a search judges a group about kProbes + kClimbSteps times; on scenes of some hundred
+/// triangles in groups of 8 that is about a millisecond.
 AdversarialReport adversarial_check(const TinIndex& index,
                                     std::span<const GroupIndex> group_of_triangle,
                                     std::uint32_t groups, const HidesGroup& hides,
@@ -57,6 +57,7 @@ AdversarialReport adversarial_check(const Tin& tin, std::span<const GroupIndex> 
                                     const CertifiedRegions& regions, std::uint64_t seed,
                                     std::size_t searches);
 
-inline constexpr int kClimbSteps = 16;
+inline constexpr int kProbes = 8;
+inline constexpr int kClimbSteps = 9;
 
 }  // namespace scarp::test
