@@ -24,10 +24,11 @@ const StabilityScene& scene_named(const std::string& name) {
   throw std::runtime_error("no scene " + name);
 }
 
-ComparisonOptions quick(std::int32_t fans, std::int32_t sectors) {
+/// Coarse, so that it is quick; docs/stability.md is made with the usual settings.
+ComparisonOptions quick() {
   ComparisonOptions options;
-  options.hiding.fans = fans;
-  options.hiding.sectors = sectors;
+  options.hiding.fans = 16;
+  options.hiding.sectors = 32;
   options.scattered_eyes = 10;
   options.searches = 40;
   options.thesis_searches = 0;
@@ -115,11 +116,11 @@ TEST(Stability, EveryLineOfTheCatalogueHasAScene) {
 }
 
 /// Neither from the scenes' own eyes, nor from scattered ones, nor where a search looks for it.
-void expect_certified_is_safe(std::int32_t fans, std::int32_t sectors) {
+TEST(Stability, CertifiedIsNeverOnTheUnsafeSide) {
   std::uint64_t culled = 0, searched = 0;
   for (const StabilityScene& scene : scenes()) {
     SCOPED_TRACE(scene.name);
-    const SceneCounts counts = compare_methods(scene, quick(fans, sectors));
+    const SceneCounts counts = compare_methods(scene, quick());
     EXPECT_EQ(counts.certified.falsely_culled, 0U);
     EXPECT_EQ(counts.certified.search.false_culls, 0U);
     culled += counts.certified.culled_of_hidden;
@@ -127,22 +128,13 @@ void expect_certified_is_safe(std::int32_t fans, std::int32_t sectors) {
   }
   // It is no safety to cull nothing.
   EXPECT_GT(culled, 20'000U);
-  EXPECT_GT(searched, 3'000U);
-}
-
-TEST(Stability, CertifiedIsNeverOnTheUnsafeSide) {
-  expect_certified_is_safe(64, 40);
-}
-
-TEST(Stability, CertifiedIsNeverOnTheUnsafeSideWithFewFans) {
-  expect_certified_is_safe(8, 40);
+  EXPECT_GT(searched, 5'000U);
 }
 
 TEST(Stability, ComparisonSeesWhereTheThesisIsWrong) {
-  ComparisonOptions options = quick(8, 8);
-  options.searches = 0;
+  ComparisonOptions options = quick();
   options.thesis_searches = 4;
-  const SceneCounts counts = compare_methods(scene_named("wall_with_gap"), options);
+  const SceneCounts counts = compare_methods(scene_named("sector_borders"), options);
   EXPECT_GT(counts.thesis.falsely_culled, 0U);
   EXPECT_GT(counts.thesis.search.cameras, 0U);
   EXPECT_GT(counts.thesis.culled_of_hidden, 0U);
@@ -153,7 +145,7 @@ TEST(Stability, SameBitsForAnyNumberOfThreads) {
     SCOPED_TRACE(name);
     const auto answer = [&](int threads) {
       set_thread_count(threads);
-      const GroupedScene grouped = group_scene(scene_named(name), quick(16, 64).hiding);
+      const GroupedScene grouped = group_scene(scene_named(name), quick().hiding);
       const AdversarialReport report = adversarial_check(
           grouped.tin, grouped.groups.group_of_triangle, grouped.groups.certified, 7, 12);
       set_thread_count(0);
