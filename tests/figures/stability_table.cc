@@ -1,5 +1,7 @@
 // Prints the table of docs/stability.md: where each method of culling fails.
-//   stability_table [--judge SCENE]   with --judge: what the judge sees of a drawn scene, instead
+//   stability_table                  the table; fails where `certified` is on the unsafe side
+//   stability_table --scenes         what the scenes stand for
+//   stability_table --judge SCENE    what the judge sees of a drawn scene, from each of its eyes
 
 #include <fmt/core.h>
 
@@ -34,11 +36,13 @@ void print_method(const MethodCounts& counts, std::uint64_t in_hidden_groups) {
              counts.search.cameras, share(counts.culled_of_hidden, in_hidden_groups));
 }
 
-void print_table() {
+/// @return whether `certified` was never wrong
+bool print_table() {
   fmt::print(
       "| scene | triangles | eyes | visible | in hidden groups | thesis: falsely culled | searched "
       "| culled / hidden | certified: falsely culled | searched | culled / hidden |\n"
       "|---|---|---|---|---|---|---|---|---|---|---|\n");
+  bool is_safe = true;
   for (const StabilityScene& scene : stability_scenes()) {
     const SceneCounts counts = compare_methods(scene, {});
     fmt::print("| {} | {} | {} | {} | {} |", scene.name, scene.tin.triangles.size(), counts.eyes,
@@ -47,16 +51,32 @@ void print_table() {
     print_method(counts.certified, counts.in_hidden_groups);
     fmt::print("\n");
     std::fflush(stdout);
+    is_safe &= counts.certified.falsely_culled + counts.certified.search.false_culls == 0;
   }
+  return is_safe;
+}
+
+/// What the names of the table stand for.
+void print_scenes() {
+  fmt::print("| scene | stands for | shows |\n|---|---|---|\n");
+  for (const StabilityScene& scene : stability_scenes())
+    fmt::print("| {} | {} | {} |\n", scene.name, scene.fails, scene.shows);
 }
 
 }  // namespace
 }  // namespace scarp::test
 
 int main(int argc, char** argv) {
-  if (argc == 3 && std::string(argv[1]) == "--judge")
+  if (argc == 3 && std::string(argv[1]) == "--judge") {
     scarp::test::print_judge(argv[2]);
-  else
-    scarp::test::print_table();
-  return 0;
+    return 0;
+  }
+  if (argc == 2 && std::string(argv[1]) == "--scenes") {
+    scarp::test::print_scenes();
+    return 0;
+  }
+  if (argc != 1) return 2;
+  if (scarp::test::print_table()) return 0;
+  fmt::print(stderr, "stability_table: certified culled what is visible, see the table\n");
+  return 1;
 }

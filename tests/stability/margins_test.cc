@@ -35,6 +35,8 @@ struct Arena {
   Tin tin;
   std::vector<GroupIndex> group_of_triangle;
   std::uint32_t groups = 0;
+  /// The more sectors there are to a fan, the less do neighbours cover up for each other.
+  std::int32_t least_fans = 8, least_sectors = 16;
 };
 
 /// Whole numbers in [low, high].
@@ -46,7 +48,7 @@ std::int32_t whole(SplitMix64& random, std::int32_t low, std::int32_t high) {
 Arena arena_of_squares(Tin tin, std::uint32_t group_triangles, double kept_share,
                        SplitMix64& random) {
   const LeafGroups squares = group_by_squares(tin, group_triangles);
-  Arena arena{std::move(tin), {}, 0};
+  Arena arena{std::move(tin), {}, 0, 8, 16};
   std::vector<GroupIndex> kept(squares.count, kNone);
   for (GroupIndex& group : kept)
     if (random.unit() < kept_share) group = arena.groups++;
@@ -58,7 +60,7 @@ Arena arena_of_squares(Tin tin, std::uint32_t group_triangles, double kept_share
 /// Groups by the middle of a triangle, in cells: a function gives kNone or the group.
 Arena arena_of(Tin tin, std::uint32_t groups,
                const std::function<GroupIndex(double column, double row)>& group_at) {
-  Arena arena{std::move(tin), {}, groups};
+  Arena arena{std::move(tin), {}, groups, 8, 128};
   for (const auto& corners : arena.tin.triangles) {
     double x_m = 0, y_m = 0;
     for (const VertexIndex v : corners)
@@ -69,7 +71,7 @@ Arena arena_of(Tin tin, std::uint32_t groups,
 }
 
 /// A long wall of posts with one or two gaps (of floor, or of void) on a rough floor; groups of few
-/// triangles on both sides.
+/// triangles on both sides, on one side long ones, of which a gap shows a part only.
 Arena fence(SplitMix64& random) {
   const std::int32_t columns = 14, rows = 32, at = whole(random, 4, 9);
   const double height_m = 10 + 90 * random.unit();
@@ -83,7 +85,14 @@ Arena fence(SplitMix64& random) {
                                    return rough_m * random.unit();
                                  }),
                          1 + random.below(3));
-  return arena_of_squares(std::move(tin), random.below(2) ? 2 : 1, 0.03, random);
+  if (random.below(2) == 0) {
+    const double wall_m = kCellM * (at - 1);
+    for (Position& p : tin.vertices)
+      if (p.x_m < wall_m) p.x_m = wall_m + 5 * (p.x_m - wall_m);
+  }
+  Arena arena = arena_of_squares(std::move(tin), random.below(2) ? 2 : 1, 0.02, random);
+  arena.least_sectors = 64;
+  return arena;
 }
 
 /// A plain with a ring of high ground around its middle, higher and lower by azimuth, sometimes
@@ -107,9 +116,11 @@ Arena crown(SplitMix64& random) {
                 return top_m + change_m * std::sin(waves * azimuth_rad + phase_rad);
               }),
       1 + random.below(3));
-  return arena_of(std::move(tin), 1, [](double column, double row) {
+  Arena arena = arena_of(std::move(tin), 1, [](double column, double row) {
     return std::abs(column - 14.5) < 0.5 && std::abs(row - 14.5) < 0.5 ? 0 : kNone;
   });
+  arena.least_fans = 16;
+  return arena;
 }
 
 /// One large group on the floor of a court, a wall close around it with one gap, and cameras near:
@@ -131,11 +142,37 @@ Arena court(SplitMix64& random) {
   const double reach = half - 1 - 0.01;
   const bool is_strip = random.below(2) == 0;
   const double strip = whole(random, 1 - half, half - 2) + 0.5;
-  return arena_of(std::move(tin), 1, [&](double column, double row) {
+  Arena arena = arena_of(std::move(tin), 1, [&](double column, double row) {
     const double x = column - 8, y = row - 8;
     const bool inside = std::max(std::abs(x), std::abs(y)) < reach;
     return inside && (!is_strip || std::abs(x - strip) < 0.5) ? 0 : kNone;
   });
+  arena.least_sectors = 64;
+  return arena;
+}
+
+/// Groups of two to four triangles that lie far apart in a maze, and cameras between and close
+/// around them: rays pass the group's centre at every offset, and there are walls before and behind
+/// the camera within the group's circle.
+Arena maze(SplitMix64& random) {
+  const std::int32_t side = 19;
+  const double height_m = 10 + 60 * random.unit(), open_share = 0.05 + 0.2 * random.unit();
+  const std::int32_t aisle = whole(random, 3, 6), cross = whole(random, 5, 20);
+  Tin tin = triangulated(
+      grid_of(side, side, kCellM,
+              [&](std::int32_t column, std::int32_t row) {
+                const bool is_wall = column % aisle == 1 || row % cross == 2;
+                return is_wall && random.unit() > open_share ? height_m : 0.3 * random.unit();
+              }),
+      1 + random.below(3));
+  const std::size_t triangles = tin.triangles.size();
+  Arena arena = arena_of(std::move(tin), 3, [](double, double) { return kNone; });
+  for (GroupIndex group = 0; group < arena.groups; ++group)
+    for (std::uint64_t i = 0; i < 2 + random.below(3); ++i)
+      arena.group_of_triangle[random.below(triangles)] = group;
+  for (GroupIndex group = 0; group < arena.groups; ++group)  // no group is empty
+    arena.group_of_triangle[random.below(triangles / 3) * 3 + group] = group;
+  return arena;
 }
 
 Arena posts(SplitMix64& random) {
@@ -192,9 +229,8 @@ AdversarialReport search_arena(MakeArena make, std::uint64_t seed, std::size_t s
   if (random.below(3) != 0) turn(arena.tin, random);
   if (arena.groups == 0 || arena.tin.triangles.empty() || check_tin(arena.tin)) return {};
   HidingOptions options;
-  const std::int32_t fans[] = {8, 8, 16, 32}, sectors[] = {16, 64, 128, 256};
-  options.fans = fans[random.below(4)];
-  options.sectors = sectors[random.below(4)];
+  options.fans = arena.least_fans << random.below(3);
+  options.sectors = arena.least_sectors << random.below(3);
   const CertifiedRegions regions =
       certify_groups(arena.tin, arena.group_of_triangle, arena.groups, options);
   const AdversarialReport report =
@@ -220,15 +256,19 @@ std::uint64_t search_arenas(MakeArena make, std::uint64_t first_seed, std::uint6
 }
 
 TEST(CertifiedMargins, FenceWithOneGap) {
-  EXPECT_GT(search_arenas(fence, 1000, 40, 200), 10'000U);
+  EXPECT_GT(search_arenas(fence, 1000, 40, 150), 10'000U);
 }
 
 TEST(CertifiedMargins, CrownHigherAndLowerByAzimuth) {
-  EXPECT_GT(search_arenas(crown, 2000, 40, 150), 10'000U);
+  EXPECT_GT(search_arenas(crown, 2000, 30, 80), 10'000U);
 }
 
 TEST(CertifiedMargins, CourtWithOneGap) {
-  EXPECT_GT(search_arenas(court, 3000, 40, 60), 10'000U);
+  EXPECT_GT(search_arenas(court, 3000, 24, 40), 5'000U);
+}
+
+TEST(CertifiedMargins, GroupsFarApartInAMaze) {
+  EXPECT_GT(search_arenas(maze, 7000, 40, 100), 10'000U);
 }
 
 TEST(CertifiedMargins, Posts) {
