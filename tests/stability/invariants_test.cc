@@ -23,6 +23,7 @@
 #include "core/viewshed/grid_sight.h"
 #include "core/viewshed/ray_horizon.h"
 #include "tests/judge/dem_window.h"
+#include "tests/support/adversarial_check.h"
 #include "tests/support/shared_data.h"
 #include "tests/support/terrain.h"
 
@@ -223,6 +224,16 @@ TEST_P(Invariants, NoPlaceInAHiddenTriangleSeesTheEye) {
       }
     }
     EXPECT_GT(culled, 100U);
+  }
+}
+
+TEST_P(Invariants, SearchFindsNoFalseCull) {
+  for (const Ground& ground : grounds()) {
+    SCOPED_TRACE(ground.name);
+    const AdversarialReport report = adversarial_check(
+        ground.tin, certified(ground).groups.group_of_triangle, certified(ground).regions, 11, 100);
+    EXPECT_EQ(report.false_culls, 0U);
+    EXPECT_GT(report.cameras, 100U);
   }
 }
 
