@@ -449,6 +449,10 @@ TEST_P(Invariants, SplittingTrianglesInTheirPlanesChangesNothing) {
       expect_safe(certified(ground), eye, whole);
       expect_safe(certified_fine, eye, parts);
     }
+    // Along an edge the line touches the ground in new vertices, too.
+    for (const auto& [a, b, c] : ground.tin.triangles)
+      for (const auto& [from, to] : {std::pair{a, b}, {b, c}, {c, a}})
+        ASSERT_FALSE(is_blocked(index_fine, ground.tin.vertices[from], ground.tin.vertices[to]));
     const std::vector<Position> places = places_around(ground.tin, 10, 200);
     for (std::size_t i = 0; i + 1 < places.size(); ++i)
       ASSERT_EQ(line_of_sight(index, places[i], places[i + 1]),
