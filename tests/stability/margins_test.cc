@@ -210,6 +210,14 @@ Arena hills(SplitMix64& random) {
   return arena_of_squares(std::move(tin), 1U << random.below(5), 0.2, random);
 }
 
+/// Posts on cells of 0.3 m, millions of metres from the origin, where a float is half a metre off.
+Arena posts_far_away(SplitMix64& random) {
+  Arena arena = posts(random);
+  for (Position& p : arena.tin.vertices)
+    p = round_to_lattice(Position{p.x_m / 32 + 4'200'000, p.y_m / 32 - 5'400'000, p.z_m / 32});
+  return arena;
+}
+
 /// Turned to any angle and stretched, so that nothing lies along fans or sectors.
 void turn(Tin& tin, SplitMix64& random) {
   const double angle_rad = 2 * std::numbers::pi * random.unit();
@@ -273,6 +281,10 @@ TEST(CertifiedMargins, GroupsFarApartInAMaze) {
 
 TEST(CertifiedMargins, Posts) {
   EXPECT_GT(search_arenas(posts, 4000, 20, 100), 5'000U);
+}
+
+TEST(CertifiedMargins, PostsFarAway) {
+  EXPECT_GT(search_arenas(posts_far_away, 8000, 10, 100), 3'000U);
 }
 
 TEST(CertifiedMargins, SlopesWithARidge) {
