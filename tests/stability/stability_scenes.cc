@@ -67,25 +67,26 @@ StabilityScene near_duplicates() {
 }
 
 StabilityScene unequal_cells() {
-  return {"unequal_cells",
-          "very unequal cell sizes",
-          "Cells from 0.5 m to 300 m, each a fifth wider than the one before, with walls among "
-          "the small ones and hills among the large.",
-          moved(triangulated(grid_of(36, 24, 10, doors_m), 5),
-                [](const Position& p) {
-                  const double column = p.x_m / 10;
-                  const double x_m = 2.5 * (std::pow(1.2, column) - 1);
-                  return Position{x_m, p.y_m, p.z_m + 0.05 * x_m * (std::fmod(column, 3) > 1)};
-                }),
-          8,
-          {}};
+  return {
+      "unequal_cells",
+      "very unequal cell sizes",
+      "Cells from 0.5 m to 250 m wide, each a fifth wider than the one before, with walls among "
+      "the small ones and hills among the large.",
+      moved(triangulated(grid_of(36, 24, 10, doors_m), 5),
+            [](const Position& p) {
+              const double column = p.x_m / 10;
+              const double x_m = 2.5 * (std::pow(1.2, column) - 1);
+              return Position{x_m, p.y_m, p.z_m + 0.05 * x_m * (std::fmod(column, 3) > 1)};
+            }),
+      8,
+      {}};
 }
 
 StabilityScene millions() {
   return {
       "millions",
       "map coordinates in the millions (float loses centimetres)",
-      "Walls 1.2 m high on cells of 0.3 m, 5,400 km from the origin.",
+      "Walls 1.2 m high on cells of 0.3 m, millions of metres from the origin.",
       moved(triangulated(grid_of(28, 28, 10, doors_m), 7),
             [](const Position& p) {
               return Position{5.4e6 + 0.03 * p.x_m, -4.2e6 + 0.03 * p.y_m, 1234.567 + 0.03 * p.z_m};
@@ -148,12 +149,13 @@ std::vector<StabilityScene> scenes_on_earth() {
       "Ridges on cells of 3 arc seconds, from 179.99 degrees east on to 180.01.",
       {"OGC:CRS84", 180 - 42 / 3600.0, -16, 3 / 3600.0, 3 / 3600.0}, ridges_m);
   add("near_pole", "the poles",
-      "Ridges in degrees, up to 0.01 degrees from the North Pole: cells as narrow as needles.",
+      "Ridges in degrees, up to 0.01 degrees from the North Pole: cells 3 to 10 times as long as "
+      "wide.",
       {"OGC:CRS84", 20, 89.99, 0.5, 3 / 3600.0}, ridges_m);
   add("on_pole", "the poles", "Ridges on cells of 90 m around the South Pole.",
       {"EPSG:3031", -1260, 1080, 90, 90}, ridges_m);
   add("refraction_0", "refraction 0 and 1",
-      "A strait of 100 km between shores of 150 m: the sea itself hides the other shore's foot.",
+      "A strait of 95 km between shores of 150 m: the sea itself hides the other shore's foot.",
       {"EPSG:32633", 450'000, 5'100'000, 5000, 5000, 0}, straits_m);
   add("refraction_1", "refraction 0 and 1",
       "The same with rays as curved as the Earth: the sea is flat.",
