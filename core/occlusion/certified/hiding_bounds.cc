@@ -38,6 +38,9 @@ using RingRow = std::array<float, kRings>;
 /// An edge is halved this often at most.
 constexpr int kMostHalvings = 6;
 
+/// Bounds are not worked on to lower others by less than this slope: they do so as they are.
+constexpr float kSlopeTolerance = 0.0003F;
+
 /// Ridges that are tried before a place goes without a wall.
 constexpr int kMostTries = 8;
 
@@ -115,6 +118,14 @@ void raise_bounds(const CellPlane* planes, const float* gradients, std::size_t c
       least[k] = bound < least[k] ? bound : least[k];
     }
   for (std::size_t k = first; k < end; ++k) best[k] = best[k] < least[k] ? least[k] : best[k];
+}
+
+/// Whether one of some bounds is less than what it is compared with, less a tolerance.
+SCARP_FOR_EACH_TARGET
+bool is_any_less(const float* bounds, const float* others, float tolerance, std::size_t count) {
+  std::int32_t any = 0;
+  for (std::size_t k = 0; k < count; ++k) any |= bounds[k] < others[k] - tolerance ? 1 : 0;
+  return any != 0;
 }
 
 /// The numbers below a count, widely spaced ones first.
@@ -338,14 +349,17 @@ class Bounding {
       const std::int32_t sectors = options_.sectors;
       reached.sector = ((look.turns.middle + turn) % sectors + sectors) % sectors;
       reached.begin = kRings, reached.end = 0;
-      for (std::size_t k = 0; k < kRings; ++k)
-        if (first[k] <= turn && turn <= last[k])
-          reached.begin = std::min(reached.begin, k), reached.end = k + 1;
       reached.best.fill(kNothing);
       if (look.depth == 0) continue;
       for (const Reached& whole : look.reached_by_depth[static_cast<std::size_t>(look.depth) - 1])
         if (whole.sector == reached.sector) reached.best = whole.best;
     }
+    for (std::size_t k = 0; k < kRings; ++k)
+      for (std::int32_t turn = first[k]; turn <= last[k]; ++turn) {
+        Reached& reached = look.reached()[static_cast<std::size_t>(turn - from)];
+        reached.begin = std::min(reached.begin, k);
+        reached.end = k + 1;
+      }
     // The outer of the lanes has the least reach.
     return high + low >= kLanes ? high : low;
   }
@@ -400,12 +414,14 @@ class Bounding {
     }
   }
 
-  /// Whether the piece would lower a bound in rings from `from` to `to`.
+  /// Whether the piece would lower a bound in rings from `from` to `to` by more than a tolerance.
   static bool is_open(const Look& look, std::size_t from, std::size_t to) {
     for (const Reached& reached : look.reached()) {
       const float* cells = look.cells + static_cast<std::size_t>(reached.sector) * kRings;
-      for (std::size_t k = std::max(from, reached.begin); k < std::min(to, reached.end); ++k)
-        if (reached.best[k] < cells[k]) return true;
+      const std::size_t begin = std::max(from, reached.begin), end = std::min(to, reached.end);
+      if (begin < end && is_any_less(reached.best.data() + begin, cells + begin, kSlopeTolerance,
+                                     end - begin))
+        return true;
     }
     return false;
   }
@@ -481,16 +497,16 @@ class Bounding {
     if (is_passed(look, piece)) return;
     look.depth = depth;
     const std::size_t lane = reach_from(look, piece);
-    if (!is_open(look, 0, kRings)) return;
+    if (!is_open(look, 0, kRings)) return lower_cells(look);
     PieceTargets& targets = look.targets[static_cast<std::size_t>(depth)];
     find_targets(look.view, piece, look.crests, candidates, targets);
     if (targets.plane) {
       look.planes.assign(1, in_cells(look, *targets.plane, lane));
       raise_reached(look, 0);
-      if (!is_open(look, 0, kRings)) return;
+      if (!is_open(look, 0, kRings)) return lower_cells(look);
     }
     raise_walls(look, piece, targets, lane);
-    if (!is_open(look, 0, kRings)) return;
+    if (!is_open(look, 0, kRings)) return lower_cells(look);
     const double du_m = piece.b.u_m - piece.a.u_m, dv_m = piece.b.v_m - piece.a.v_m;
     const double size_m = options_.piece * unit_m_;
     if (depth < kMostHalvings && du_m * du_m + dv_m * dv_m > size_m * size_m) {
@@ -500,6 +516,10 @@ class Bounding {
       look_from_piece(look, {middle, piece.b, piece.edge}, targets.crests, depth + 1);
       return;
     }
+    lower_cells(look);
+  }
+
+  static void lower_cells(Look& look) {
     for (const Reached& reached : look.reached()) {
       float* cells = look.cells + static_cast<std::size_t>(reached.sector) * kRings;
       for (std::size_t k = reached.begin; k < reached.end; ++k) {

@@ -91,7 +91,9 @@ void find_targets(const FanView& view, const ExitPiece& piece, std::span<const F
     const FanEdge& crest = crests[i];
     double from = 0, to = 1;
     cut(wedge.low.at(crest.a), wedge.low.at(crest.b), from, to);
+    if (!(from <= to)) continue;
     cut(wedge.high.at(crest.a), wedge.high.at(crest.b), from, to);
+    if (!(from <= to)) continue;
     cut(wedge.behind.at(crest.a), wedge.behind.at(crest.b), from, to);
     if (!(from <= to)) continue;
     targets.crests.push_back(i);
