@@ -133,16 +133,9 @@ class Joining {
 
 /// Middle directions of the sectors.
 std::vector<Axis> directions_of(const PolarLayout& layout) {
-  // Inverse of the sectors' definition: s (1.273 - 0.273 s) = f.
   std::vector<Axis> axes;
   for (std::int32_t sector = 0; sector < layout.sectors; ++sector) {
-    const double eighths = (sector + 0.5) * 8 / layout.sectors;
-    const int eighth = static_cast<int>(eighths);
-    const double part = eighths - eighth;
-    const double f = eighth % 2 == 0 ? part : 1 - part;
-    const double s = (1.273 - std::sqrt(1.273 * 1.273 - 4 * 0.273 * f)) / (2 * 0.273);
-    const double azimuth_rad = M_PI / 4 * (eighth % 2 == 0 ? eighth : eighth + 1) +
-                               (eighth % 2 == 0 ? 1 : -1) * std::atan(s);
+    const double azimuth_rad = azimuth_at(layout, sector + 0.5);
     axes.push_back({std::cos(azimuth_rad), std::sin(azimuth_rad)});
   }
   return axes;

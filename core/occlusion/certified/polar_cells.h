@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 
 namespace scarp {
 
@@ -58,6 +59,17 @@ std::int32_t sector_of(const PolarLayout& layout, Real x, Real y) {
   const Real eighths = y < 0 ? 8 - half : half;
   const auto sector = static_cast<std::int32_t>(eighths * static_cast<Real>(layout.sectors / 8));
   return sector < layout.sectors ? sector : 0;
+}
+
+/// The azimuth, radians, at a place in the row of sectors: 2.5 is the middle of sector 2.
+inline double azimuth_at(const PolarLayout& layout, double sector) {
+  const double eighths = sector * 8 / layout.sectors;
+  const auto eighth = static_cast<int>(eighths);
+  const double part = eighths - eighth;
+  const double f = eighth % 2 == 0 ? part : 1 - part;
+  const double s = (1.273 - std::sqrt(1.273 * 1.273 - 4 * 0.273 * f)) / (2 * 0.273);
+  return std::numbers::pi / 4 * (eighth % 2 == 0 ? eighth : eighth + 1) +
+         (eighth % 2 == 0 ? 1 : -1) * std::atan(s);
 }
 
 }  // namespace scarp

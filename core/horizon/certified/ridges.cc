@@ -1,0 +1,88 @@
+#include "core/horizon/certified/ridges.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/geodesy/predicates.h"
+
+namespace scarp {
+
+RidgeEdges ridge_edges_of(const Tin& tin) {
+  RidgeEdges ridges;
+  ridges.first_around.assign(tin.vertices.size() + 1, 0);
+  const auto visit_edges = [&](auto visit) {
+    for (TriangleIndex t = 0; t < tin.triangles.size(); ++t)
+      for (std::size_t i = 0; i < 3; ++i) {
+        const TriangleIndex other = tin.neighbours[t][i];
+        if (other == kNone || t < other)
+          visit(t, other, tin.triangles[t][(i + 1) % 3], tin.triangles[t][(i + 2) % 3]);
+      }
+  };
+  visit_edges([&](TriangleIndex t, TriangleIndex other, VertexIndex from, VertexIndex to) {
+    ++ridges.first_around[from + 1];
+    ++ridges.first_around[to + 1];
+    const auto& [a, b, c] = tin.triangles[t];
+    bool is_ridge = other == kNone;
+    if (!is_ridge)
+      for (const VertexIndex apex : tin.triangles[other])
+        is_ridge |= apex != from && apex != to &&
+                    orient3d(tin.vertices[a], tin.vertices[b], tin.vertices[c],
+                             tin.vertices[apex]) < 0;
+    if (is_ridge) ridges.edges.push_back({from, to});
+  });
+  for (std::size_t v = 0; v < tin.vertices.size(); ++v)
+    ridges.first_around[v + 1] += ridges.first_around[v];
+  ridges.around.resize(ridges.first_around.back());
+  std::vector<std::uint32_t> next(ridges.first_around.begin(), ridges.first_around.end() - 1);
+  visit_edges([&](TriangleIndex, TriangleIndex, VertexIndex from, VertexIndex to) {
+    ridges.around[next[from]++] = to;
+    ridges.around[next[to]++] = from;
+  });
+  return ridges;
+}
+
+void Ridges::cross(const RidgeEdges& ridges, const FanView& view, double width_m) {
+  width_m_ = width_m;
+  low_v_m_ = view.low_v_m;
+  const auto strips = static_cast<std::size_t>((view.high_v_m - view.low_v_m) / width_m) + 1;
+  first_.assign(strips + 1, 0);
+  /// Calls visit(strip, u, z) for the middle lines that an edge crosses.
+  const auto visit_crossings = [&](const RidgeEdges::Edge& edge, auto visit) {
+    const FanPlace& p = view.vertices[edge[0]];
+    const FanPlace& q = view.vertices[edge[1]];
+    const double low = (std::min(p.v_m, q.v_m) - low_v_m_) / width_m - 0.5;
+    const double high = (std::max(p.v_m, q.v_m) - low_v_m_) / width_m - 0.5;
+    const auto last = static_cast<std::ptrdiff_t>(std::floor(high));
+    for (auto s = static_cast<std::ptrdiff_t>(std::ceil(low)); s <= last; ++s) {
+      if (s < 0 || s >= static_cast<std::ptrdiff_t>(strips) || !(p.v_m != q.v_m)) continue;
+      const double v_m = low_v_m_ + (static_cast<double>(s) + 0.5) * width_m;
+      const double share = (v_m - p.v_m) / (q.v_m - p.v_m);
+      visit(static_cast<std::size_t>(s), p.u_m + share * (q.u_m - p.u_m),
+            p.z_m + share * (q.z_m - p.z_m));
+    }
+  };
+  for (const auto& edge : ridges.edges)
+    visit_crossings(edge, [&](std::size_t s, double, double) { ++first_[s + 1]; });
+  for (std::size_t s = 0; s < strips; ++s) first_[s + 1] += first_[s];
+  crossings_.resize(first_.back());
+  std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
+  for (std::uint32_t e = 0; e < ridges.edges.size(); ++e)
+    visit_crossings(ridges.edges[e], [&](std::size_t s, double u_m, double z_m) {
+      crossings_[next[s]++] = {static_cast<float>(u_m), static_cast<float>(z_m), e};
+    });
+  for (std::size_t s = 0; s < strips; ++s)
+    std::sort(crossings_.begin() + static_cast<std::ptrdiff_t>(first_[s]),
+              crossings_.begin() + static_cast<std::ptrdiff_t>(first_[s + 1]),
+              [](const RidgeCrossing& a, const RidgeCrossing& b) {
+                return a.u_m < b.u_m || (a.u_m == b.u_m && a.edge < b.edge);
+              });
+}
+
+std::span<const RidgeCrossing> Ridges::along(double v_m) const {
+  const double strip = (v_m - low_v_m_) / width_m_;
+  const auto s = static_cast<std::size_t>(
+      std::clamp(strip, 0.0, static_cast<double>(first_.size() - 2)));
+  return {crossings_.data() + first_[s], first_[s + 1] - first_[s]};
+}
+
+}  // namespace scarp

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/horizon/certified/fan.h"
+#include "core/terrain/tin.h"
+
+namespace scarp {
+
+/// The edges of a surface on which a horizon can lie: those that bend downwards (exact), and
+/// borders, beyond which there is no ground. With the edges around each vertex, to follow them.
+struct RidgeEdges {
+  using Edge = std::array<VertexIndex, 2>;
+
+  std::vector<Edge> edges;
+  std::vector<std::uint32_t> first_around;  ///< [vertices + 1], into around
+  std::vector<VertexIndex> around;          ///< the other ends of all edges at a vertex
+
+  std::span<const VertexIndex> around_of(VertexIndex v) const {
+    return {around.data() + first_around[v], first_around[v + 1] - first_around[v]};
+  }
+};
+
+/// Requires tin.neighbours. Cost: O(triangles).
+RidgeEdges ridge_edges_of(const Tin& tin);
+
+/// Where an edge crosses the middle line of a strip.
+struct RidgeCrossing {
+  float u_m, z_m;
+  std::uint32_t edge;  ///< into RidgeEdges::edges
+};
+
+/// The ridges of a surface along a fan: for strips of equal width along its axis, the crossings of
+/// their middle lines by rising u. Tells where to look for what hides; what is hidden follows from
+/// the edges themselves. Side: none; heights and places are rounded.
+class Ridges {
+ public:
+  /// Cost: O(edges * (1 + length / width)) time, 12 bytes a crossing.
+  void cross(const RidgeEdges& ridges, const FanView& view, double width_m);
+
+  /// The crossings of the strip that holds v.
+  std::span<const RidgeCrossing> along(double v_m) const;
+
+ private:
+  double low_v_m_ = 0, width_m_ = 1;
+  std::vector<std::size_t> first_;  // [strips + 1]
+  std::vector<RidgeCrossing> crossings_;
+};
+
+}  // namespace scarp

@@ -1,0 +1,108 @@
+#include "core/horizon/certified/wall.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+namespace scarp {
+namespace {
+
+/// A chain is followed this far each way.
+constexpr int kMostSteps = 12;
+
+/// A chain must not run nearly along the fan: its edges turn from the axis by this tangent at
+/// least. Guides the search; that rays cross an edge one way is asked for besides.
+constexpr double kLeastTurn = 0.3;
+
+class Chain {
+ public:
+  Chain(const RidgeEdges& ridges, const FanView& view, const Beam& beam, double slope)
+      : ridges_(ridges), view_(view), beam_(beam), slope_(slope) {}
+
+  /// The vertices of the chain by rising v; nothing where it does not span the beam.
+  bool follow(const RidgeEdges::Edge& edge) {
+    VertexIndex low = edge[0], high = edge[1];
+    if (place(low).v_m > place(high).v_m) std::swap(low, high);
+    if (!is_crossed(place(low), place(high))) return false;
+    std::array<VertexIndex, kMostSteps> below;
+    std::size_t count = 0;
+    while (beam_.low.at(place(low)) >= 0) {
+      const auto next = highest_from(low, -1);
+      if (!next || count == kMostSteps) return false;
+      below[count++] = low = *next;
+    }
+    vertices.assign(below.rend() - static_cast<std::ptrdiff_t>(count), below.rend());
+    vertices.push_back(edge[0] == high ? edge[1] : edge[0]);
+    vertices.push_back(high);
+    for (int steps = 0; beam_.high.at(place(high)) >= 0; ++steps) {
+      const auto next = highest_from(high, 1);
+      if (!next || steps == kMostSteps) return false;
+      vertices.push_back(high = *next);
+    }
+    return true;
+  }
+
+  std::vector<VertexIndex> vertices;
+
+ private:
+  const FanPlace& place(VertexIndex v) const { return view_.vertices[v]; }
+
+  /// Whether all rays of the fan cross an edge from behind to beyond; p has the lesser v.
+  bool is_crossed(const FanPlace& p, const FanPlace& q) const {
+    const double least = std::max(view_.fan.tan_half, kLeastTurn);
+    return q.v_m - p.v_m > std::abs(q.u_m - p.u_m) * least + 8 * view_.error_m;
+  }
+
+  /// The edge that rises most across the beam, as sight lines of the slope see it.
+  std::optional<VertexIndex> highest_from(VertexIndex v, int side) const {
+    const FanPlace& p = place(v);
+    std::optional<VertexIndex> best;
+    double best_rise = -HUGE_VAL;
+    for (const VertexIndex other : ridges_.around_of(v)) {
+      const FanPlace& q = place(other);
+      if (!(side > 0 ? is_crossed(p, q) : is_crossed(q, p))) continue;
+      const double rise = (q.z_m - p.z_m - slope_ * (q.u_m - p.u_m)) / std::abs(q.v_m - p.v_m);
+      if (rise > best_rise) best = other, best_rise = rise;
+    }
+    return best;
+  }
+
+  const RidgeEdges& ridges_;
+  const FanView& view_;
+  const Beam& beam_;
+  double slope_;
+};
+
+}  // namespace
+
+bool raise_wall(const RidgeEdges& ridges, const FanView& view, const Beam& beam,
+                std::span<const FanPlace> targets, std::uint32_t edge, double slope, Wall& wall) {
+  thread_local std::vector<VertexIndex> kept;
+  Chain chain(ridges, view, beam, slope);
+  chain.vertices.swap(kept);
+  const bool spans = chain.follow(ridges.edges[edge]);
+  kept.swap(chain.vertices);
+  if (!spans) return false;
+  wall.u_m = -HUGE_VAL;
+  wall.planes.clear();
+  for (std::size_t i = 0; i + 1 < kept.size(); ++i) {
+    const FanPlace &a = view.vertices[kept[i]], &b = view.vertices[kept[i + 1]];
+    double from = 0, to = 1;
+    cut(beam.low.at(a), beam.low.at(b), from, to);
+    cut(beam.high.at(a), beam.high.at(b), from, to);
+    if (!(from <= to)) continue;
+    const std::array<FanPlace, 2> ends{between(a, b, from), between(a, b, to)};
+    EdgePlane plane(view, a, b);
+    for (const FanPlace& target : targets) plane.hold(target);
+    if (!plane.is_held()) return false;
+    for (const FanPlace& end : ends) {
+      if (!(beam.ahead.at(end) > 8 * view.error_m)) return false;
+      wall.u_m = std::max(wall.u_m, end.u_m);
+    }
+    wall.planes.push_back(plane.plane(ends[0], ends[1]));
+  }
+  return !wall.planes.empty();
+}
+
+}  // namespace scarp

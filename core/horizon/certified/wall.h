@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/horizon/certified/edge_plane.h"
+#include "core/horizon/certified/fan.h"
+#include "core/horizon/certified/ridges.h"
+
+namespace scarp {
+
+/// c0 + cu * u + cv * v: the signed distance from a line in the fan's frame, or a multiple of it.
+struct HalfPlane {
+  double c0, cu, cv;
+
+  double at(const FanPlace& p) const { return c0 + cu * p.u_m + cv * p.v_m; }
+};
+
+/// Cuts [from, to], shares of an edge whose ends are at `p` and `q` by a half-plane, to where it is
+/// not negative; from > to where nothing is left.
+inline void cut(double p, double q, double& from, double& to) {
+  if (p < 0 && q < 0) to = -1;
+  if (p < 0 && q >= 0) from = from > p / (p - q) ? from : p / (p - q);
+  if (p >= 0 && q < 0) to = to < p / (p - q) ? to : p / (p - q);
+}
+
+inline FanPlace between(const FanPlace& p, const FanPlace& q, double share) {
+  return {p.u_m + share * (q.u_m - p.u_m), p.v_m + share * (q.v_m - p.v_m),
+          p.z_m + share * (q.z_m - p.z_m)};
+}
+
+/// Where rays of a fan can be, beyond what they have come through: not negative in all three.
+struct Beam {
+  HalfPlane low, high, ahead;
+};
+
+/// What a chain of edges across a beam hides: cameras beyond u_m strictly under every plane.
+struct Wall {
+  double u_m;
+  std::vector<SkyPlane> planes;
+};
+
+/// Raises a wall on a ridge: follows it both ways, along the edges that look highest, until it
+/// spans the beam, and hangs from each of its edges the plane that has all targets under it.
+///
+/// Why it is right. Each edge is crossed by rays of the fan from behind to beyond only, and the
+/// chain runs from one side of the beam to the other, so every ray crosses one of its edges after
+/// it has come through what the beam begins with. Under that edge's plane it is hidden
+/// (EdgePlane), and a camera under all of the planes is.
+///
+/// @param targets  all that may be seen, as the corners of its hull, heights rounded up
+/// @param slope    of the sight lines that the wall is to stop; guides where the chain goes
+/// @return whether there is such a wall
+/// Side: planes never above the true ones. Cost: O(chain * (targets + edges at a vertex)).
+bool raise_wall(const RidgeEdges& ridges, const FanView& view, const Beam& beam,
+                std::span<const FanPlace> targets, std::uint32_t edge, double slope, Wall& wall);
+
+}  // namespace scarp

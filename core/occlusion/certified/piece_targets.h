@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/horizon/certified/fan.h"
+#include "core/horizon/certified/wall.h"
+#include "core/occlusion/certified/group_edges.h"
+#include "core/terrain/tin.h"
+
+namespace scarp {
+
+/// An edge in a fan's frame.
+struct FanEdge {
+  FanPlace a, b;
+  VertexIndex from, to;
+};
+
+/// A part of a border edge of a group, over which rays of a fan leave the group; directed like the
+/// edge, with the group on the left. v rises from a to b but for edges along the fan.
+struct ExitPiece {
+  FanPlace a, b;
+  const FanEdge* edge;
+};
+
+/// Whether every ray of the fan that meets the edge's line crosses it from left to right.
+inline bool is_exit(const FanView& view, const FanEdge& edge) {
+  const double du_m = edge.b.u_m - edge.a.u_m, dv_m = edge.b.v_m - edge.a.v_m;
+  return dv_m - (du_m < 0 ? -du_m : du_m) * view.fan.tan_half > 8 * view.error_m;
+}
+
+/// Whether no ray of the fan does.
+inline bool is_entry(const FanView& view, const FanEdge& edge) {
+  const double du_m = edge.b.u_m - edge.a.u_m, dv_m = edge.b.v_m - edge.a.v_m;
+  return dv_m + (du_m < 0 ? -du_m : du_m) * view.fan.tan_half < -8 * view.error_m;
+}
+
+/// All that rays over a piece can come from, and where they go.
+struct PieceTargets {
+  /// A camera on a ray over the piece, beyond it, is hidden from all of them by the piece itself
+  /// if it is strictly under the plane.
+  std::optional<SkyPlane> plane;
+  std::vector<FanPlace> places;        ///< corners of what is seen of the group, rounded up
+  std::vector<FanPlace> hull;          ///< of these in (u, z), the upper one, by rising u
+  std::vector<std::uint32_t> crests;   ///< those of the candidates that touch the wedge
+  Beam beam;                           ///< of the rays beyond the piece
+};
+
+/// Finds the ground of a group from which rays of the fan can reach a piece: the wedge behind it.
+/// A camera strictly under the plane through the border edge that has all of this ground under it
+/// sees none of it over the piece (EdgePlane).
+///
+/// Side: the plane never above the true one; places never below the ground.
+/// @param crests      edges of the group, in the fan's frame
+/// @param candidates  those that can matter
+/// Cost: O(candidates + found log found).
+void find_targets(const FanView& view, const ExitPiece& piece, std::span<const FanEdge> crests,
+                  std::span<const std::uint32_t> candidates, PieceTargets& targets);
+
+}  // namespace scarp
