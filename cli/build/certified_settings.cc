@@ -6,7 +6,6 @@ HidingOptions hiding_options(const CertifiedSettings& settings) {
   HidingOptions options;
   options.fans = settings.fans;
   options.sectors = settings.sectors;
-  options.spacing *= settings.patch;
   options.width *= settings.patch;
   options.piece *= settings.patch;
   return options;

@@ -45,17 +45,15 @@ class EdgePlane {
   double behind_m(const FanPlace& place) const {
     return eu_ * (place.v_m - a_.v_m) - ev_ * (place.u_m - a_.u_m);
   }
-  bool is_too_near(const FanPlace& place) const {
-    return !(behind_m(place) > kTooNear * error_m_);
-  }
+  bool is_too_near(const FanPlace& place) const { return !(behind_m(place) > kTooNear * error_m_); }
 
   /// Has a place on or under the plane. One that is too near, or beyond, cannot be.
   void hold(const FanPlace& place) {
     const double behind = behind_m(place);
     if (!(behind > kTooNear * error_m_)) return give_up();
-    const double above_m =
-        place.z_m - a_.z_m -
-        along_ * (eu_ * (place.u_m - a_.u_m) + ev_ * (place.v_m - a_.v_m)) + height_error_m_;
+    const double above_m = place.z_m - a_.z_m -
+                           along_ * (eu_ * (place.u_m - a_.u_m) + ev_ * (place.v_m - a_.v_m)) +
+                           height_error_m_;
     // The plane falls outwards where the place is above the edge.
     const double rise = -above_m / (behind + (above_m > 0 ? -error_m_ : error_m_));
     rise_ = rise < rise_ ? rise : rise_;
@@ -79,11 +77,10 @@ class EdgePlane {
                    steepness * 0x1p-44,
                    0,
                    0};
-    plane.line_slope =
-        plane.ahead - std::abs(plane.left) * view_.fan.tan_half - plane.slope_error;
-    plane.line_m = std::min(from.z_m - plane.line_slope * from.u_m,
-                            to.z_m - plane.line_slope * to.u_m) -
-                   2 * plane.error_m;
+    plane.line_slope = plane.ahead - std::abs(plane.left) * view_.fan.tan_half - plane.slope_error;
+    plane.line_m =
+        std::min(from.z_m - plane.line_slope * from.u_m, to.z_m - plane.line_slope * to.u_m) -
+        2 * plane.error_m;
     return plane;
   }
 

@@ -25,9 +25,9 @@ RidgeEdges ridge_edges_of(const Tin& tin) {
     bool is_ridge = other == kNone;
     if (!is_ridge)
       for (const VertexIndex apex : tin.triangles[other])
-        is_ridge |= apex != from && apex != to &&
-                    orient3d(tin.vertices[a], tin.vertices[b], tin.vertices[c],
-                             tin.vertices[apex]) < 0;
+        is_ridge |=
+            apex != from && apex != to &&
+            orient3d(tin.vertices[a], tin.vertices[b], tin.vertices[c], tin.vertices[apex]) < 0;
     if (is_ridge) ridges.edges.push_back({from, to});
   });
   for (std::size_t v = 0; v < tin.vertices.size(); ++v)
@@ -80,8 +80,8 @@ void Ridges::cross(const RidgeEdges& ridges, const FanView& view, double width_m
 
 std::span<const RidgeCrossing> Ridges::along(double v_m) const {
   const double strip = (v_m - low_v_m_) / width_m_;
-  const auto s = static_cast<std::size_t>(
-      std::clamp(strip, 0.0, static_cast<double>(first_.size() - 2)));
+  const auto s =
+      static_cast<std::size_t>(std::clamp(strip, 0.0, static_cast<double>(first_.size() - 2)));
   return {crossings_.data() + first_[s], first_[s + 1] - first_[s]};
 }
 

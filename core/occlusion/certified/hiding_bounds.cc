@@ -24,7 +24,7 @@ namespace {
 /// Rays of one direction through a group are sorted by where they pass its centre, in lanes.
 constexpr std::int32_t kLanes = 128;
 
-/// Directions that are worked on at once; their curtains are in memory together.
+/// Directions that are worked on at once; their ridges are in memory together.
 constexpr std::int32_t kFansAtOnce = 4;
 
 /// Relative allowance for the rounding of a slope in float: about ten operations of 2^-24 each.
@@ -145,7 +145,10 @@ class Bounding {
  public:
   Bounding(const Tin& tin, std::span<const GroupIndex> group_of_triangle, std::uint32_t groups,
            const HidingOptions& options)
-      : tin_(tin), options_(options), edges_(edges_of_groups(tin, group_of_triangle, groups)), ridge_edges_(ridge_edges_of(tin)) {
+      : tin_(tin),
+        options_(options),
+        edges_(edges_of_groups(tin, group_of_triangle, groups)),
+        ridge_edges_(ridge_edges_of(tin)) {
     draw_circles(groups);
     const Bounds bounds = bounds_of(tin.vertices);
     const double width_m = bounds.high.x_m - bounds.low.x_m;
@@ -298,8 +301,7 @@ class Bounding {
     });
     std::vector<std::uint32_t> all(look.crests.size());
     std::iota(all.begin(), all.end(), 0U);
-    for (const FanEdge& edge : look.exits)
-      look_from_piece(look, {edge.a, edge.b, &edge}, all, 0);
+    for (const FanEdge& edge : look.exits) look_from_piece(look, {edge.a, edge.b, &edge}, all, 0);
   }
 
   /// Whether every ray over the piece leaves the group once more, over one edge: then it has been
@@ -419,8 +421,8 @@ class Bounding {
     for (const Reached& reached : look.reached()) {
       const float* cells = look.cells + static_cast<std::size_t>(reached.sector) * kRings;
       const std::size_t begin = std::max(from, reached.begin), end = std::min(to, reached.end);
-      if (begin < end && is_any_less(reached.best.data() + begin, cells + begin, kSlopeTolerance,
-                                     end - begin))
+      if (begin < end &&
+          is_any_less(reached.best.data() + begin, cells + begin, kSlopeTolerance, end - begin))
         return true;
     }
     return false;
@@ -439,8 +441,8 @@ class Bounding {
     };
     const auto raise = [&](const Sighted& sighted) {
       Wall& wall = look.wall;
-      if (!raise_wall(ridge_edges_, view, targets.beam, targets.places, sighted.edge,
-                      sighted.slope, wall))
+      if (!raise_wall(ridge_edges_, view, targets.beam, targets.places, sighted.edge, sighted.slope,
+                      wall))
         return false;
       look.planes.clear();
       for (const SkyPlane& plane : wall.planes) look.planes.push_back(in_cells(look, plane, lane));

@@ -16,9 +16,9 @@ namespace scarp {
 struct HidingOptions {
   std::int32_t fans = 512;     ///< of directions; a multiple of 8
   std::int32_t sectors = 248;  ///< of camera azimuths around a group
-  double spacing = 0.5;        ///< of curtains, in mean distances between vertices
-  double width = 0.5;          ///< of strips, in the same unit
-  double piece = 1.0;          ///< greatest length of a target, in the same unit
+  double piece = 0.5;   ///< greatest length of what is looked at by itself of a group's border, in
+                        ///< mean distances between vertices
+  double width = 0.25;  ///< of strips in which ridges are looked for, in the same unit
 };
 
 /// For each group, sector of azimuths and ring of distances that a camera can have from the
@@ -40,6 +40,19 @@ struct HidingBounds {
   }
 };
 
+/// Bounds all groups. For each fan of directions and each piece of a group's border over which rays
+/// of the fan leave the group, planes are found that have all ground of the group behind the piece
+/// under them: through the border itself, and through chains of ridges further out that every such
+/// ray has to cross. What is strictly under the plane of its ray beyond the edge sees nothing of
+/// that ground (EdgePlane, raise_wall). In the vertical plane of a ray this is all there is: a
+/// camera sees something of a group exactly where nothing beyond rises above its tangent to the
+/// hull of the group's slice.
+///
+/// Side: never more than is hidden. The same bits for any number of threads.
+/// Requires tin.neighbours, a group or kNone for each triangle, groups that have one.
+/// Cost: about fans * 2.5 us a triangle, and 256 bytes for each group and sector.
+/// Source: own; supporting planes as in Law and Tan 1999, for one ridge and all of a group's
+/// ground.
 HidingBounds bound_hiding(const Tin& tin, std::span<const GroupIndex> group_of_triangle,
                           std::uint32_t groups, const HidingOptions& options,
                           const Progress& progress = {});

@@ -42,10 +42,10 @@ struct PieceTargets {
   /// A camera on a ray over the piece, beyond it, is hidden from all of them by the piece itself
   /// if it is strictly under the plane.
   std::optional<SkyPlane> plane;
-  std::vector<FanPlace> places;        ///< corners of what is seen of the group, rounded up
-  std::vector<FanPlace> hull;          ///< of these in (u, z), the upper one, by rising u
-  std::vector<std::uint32_t> crests;   ///< those of the candidates that touch the wedge
-  Beam beam;                           ///< of the rays beyond the piece
+  std::vector<FanPlace> places;       ///< corners of what is seen of the group, rounded up
+  std::vector<FanPlace> hull;         ///< of these in (u, z), the upper one, by rising u
+  std::vector<std::uint32_t> crests;  ///< those of the candidates that touch the wedge
+  Beam beam;                          ///< of the rays beyond the piece
 };
 
 /// Finds the ground of a group from which rays of the fan can reach a piece: the wedge behind it.

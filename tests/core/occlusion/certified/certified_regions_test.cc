@@ -210,7 +210,6 @@ TEST(CertifiedRegions, FewFansAndSectorsAreAsSafe) {
     SCOPED_TRACE(count);
     HidingOptions options;
     options.fans = options.sectors = count;
-    options.spacing = 2;
     options.width = 1.5;
     options.piece = 4;
     const Certified scene =
