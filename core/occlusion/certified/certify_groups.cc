@@ -17,9 +17,6 @@ constexpr std::size_t kSteps = std::tuple_size_v<SectorSteps>;
 /// Bounds far above all ground say no more than those that reach this far above it.
 constexpr double kHeadroomM = 2000;
 
-/// Cameras are taken to be as often between 0 and this height above ground as between it and three
-/// times it, and so on.
-
 /// Cameras outside the data count little, but they count.
 constexpr double kOutsideWeight = 1e-6;
 
@@ -52,7 +49,7 @@ class Worth {
       const double middle_m = (start_m_[k] + start_m_[k + 1]) / 2;
       const double x_m = circle_.x_m + direction.x * middle_m;
       const double y_m = circle_.y_m + direction.y * middle_m;
-      floor_m_[k] = ground_.around(x_m, y_m, size_m / 4);
+      floor_m_[k] = ground_.around(x_m, y_m, size_m);
       weight_[k] = (ground_.is_inside(x_m, y_m) ? 1 : kOutsideWeight) * middle_m * size_m /
                    (start_m_[0] * start_m_[0]);
     }
@@ -82,53 +79,58 @@ class Worth {
   std::array<double, kRings> floor_m_{}, weight_{};
 };
 
-/// Joins neighbouring runs until kSteps are left, cheapest first.
+/// Shares the rings of a sector out to kSteps runs so that least is lost.
+/// Cost: O(kRings^2 * (kSteps + falls of the slope)).
 class Joining {
  public:
-  Joining(const Worth& worth, std::span<const float> slopes) : worth_(worth) {
-    for (std::size_t k = 0; k < kRings; ++k) {
-      const auto slope = static_cast<double>(slopes[k]);
-      const double wanted = slope >= worth.low_slope(k) ? worth.of(slope, k) : 0;
-      // A bound that is of no use here may still let a run pass over the ring.
-      runs_.push_back({static_cast<std::int32_t>(k), slope, wanted, 0});
-    }
+  Joining(const Worth& worth, std::span<const float> slopes) : slopes_(slopes) {
+    for (std::size_t first = 0; first < kRings; ++first) weigh_runs_from(worth, first);
   }
 
-  const std::vector<Run>& join() {
-    std::vector<double> price;
-    for (std::size_t i = 0; i + 1 < runs_.size(); ++i) price.push_back(price_of(i));
-    while (runs_.size() > kSteps) {
-      const auto i =
-          static_cast<std::size_t>(std::min_element(price.begin(), price.end()) - price.begin());
-      runs_[i] = joined(i);
-      runs_.erase(runs_.begin() + static_cast<std::ptrdiff_t>(i) + 1);
-      price.erase(price.begin() + static_cast<std::ptrdiff_t>(i));
-      if (i < price.size()) price[i] = price_of(i);
-      if (i > 0) price[i - 1] = price_of(i - 1);
+  std::array<Run, kSteps> join() const {
+    // lost[n][end]: the least that n runs lose of the rings before `end`; begin: of the last one.
+    std::array<std::array<double, kRings + 1>, kSteps + 1> lost;
+    std::array<std::array<std::size_t, kRings + 1>, kSteps + 1> begin{};
+    for (auto& row : lost) row.fill(HUGE_VAL);
+    lost[0][0] = 0;
+    for (std::size_t n = 1; n <= kSteps; ++n)
+      for (std::size_t end = n; end <= kRings; ++end)
+        for (std::size_t first = n - 1; first < end; ++first) {
+          const double loss = lost[n - 1][first] + runs_[first][end - 1].cost;
+          if (loss < lost[n][end]) lost[n][end] = loss, begin[n][end] = first;
+        }
+    std::array<Run, kSteps> joined;
+    std::size_t end = kRings;
+    for (std::size_t n = kSteps; n > 0; --n) {
+      const std::size_t first = begin[n][end];
+      joined[n - 1] = runs_[first][end - 1];
+      end = first;
     }
-    return runs_;
+    return joined;
   }
 
  private:
-  std::int32_t end_of(std::size_t i) const {
-    return i + 1 < runs_.size() ? runs_[i + 1].first : kRings;
-  }
-  Run joined(std::size_t i) const {
-    Run run{runs_[i].first, std::min(runs_[i].least, runs_[i + 1].least),
-            runs_[i].wanted + runs_[i + 1].wanted, 0};
-    double kept = 0;
-    if (run.least > -HUGE_VAL)
-      for (std::int32_t k = run.first; k < end_of(i + 1); ++k)
-        kept += worth_.of(run.least, static_cast<std::size_t>(k));
-    run.cost = run.wanted - kept;
-    return run;
-  }
-  double price_of(std::size_t i) const {
-    return joined(i).cost - runs_[i].cost - runs_[i + 1].cost;
+  void weigh_runs_from(const Worth& worth, std::size_t first) {
+    double wanted = 0, kept = 0;
+    double least = HUGE_VAL;
+    for (std::size_t last = first; last < kRings; ++last) {
+      const auto slope = static_cast<double>(slopes_[last]);
+      // A bound that is of no use here may still let a run pass over the ring.
+      if (slope >= worth.low_slope(last)) wanted += worth.of(slope, last);
+      if (slope < least) {
+        least = slope;
+        kept = 0;
+        for (std::size_t k = first; k <= last && least > -HUGE_VAL; ++k)
+          kept += worth.of(least, k);
+      } else if (least > -HUGE_VAL) {
+        kept += worth.of(least, last);
+      }
+      runs_[first][last] = {static_cast<std::int32_t>(first), least, wanted, wanted - kept};
+    }
   }
 
-  const Worth& worth_;
-  std::vector<Run> runs_;
+  std::span<const float> slopes_;
+  std::array<std::array<Run, kRings>, kRings> runs_;  // [first][last]
 };
 
 /// Middle directions of the sectors.
@@ -162,7 +164,7 @@ void compress_group(const HidingBounds& bounds, const LeastGround& ground,
                     const std::vector<Axis>& directions, GroupIndex g, CertifiedRegions& regions) {
   const auto sectors = static_cast<std::size_t>(regions.layout.sectors);
   Worth worth(bounds, ground, g);
-  std::vector<std::vector<Run>> runs(sectors);
+  std::vector<std::array<Run, kSteps>> runs(sectors);
   double low = HUGE_VAL, high = -HUGE_VAL;
   for (std::size_t s = 0; s < sectors; ++s) {
     worth.turn_to(directions[s]);
@@ -188,8 +190,7 @@ void compress_group(const HidingBounds& bounds, const LeastGround& ground,
   for (std::size_t s = 0; s < sectors; ++s) {
     SectorSteps& steps = regions.steps[g * sectors + s];
     for (std::size_t i = 0; i < kSteps; ++i) {
-      // What is left over repeats the last step.
-      const Run& run = runs[s][std::min(i, runs[s].size() - 1)];
+      const Run& run = runs[s][i];
       steps[i] = static_cast<std::uint16_t>(run.first << kSlopeBits | slope_code(group, run.least));
     }
   }
