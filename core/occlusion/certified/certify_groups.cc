@@ -120,8 +120,7 @@ class Joining {
       if (slope < least) {
         least = slope;
         kept = 0;
-        for (std::size_t k = first; k <= last && least > -HUGE_VAL; ++k)
-          kept += worth.of(least, k);
+        for (std::size_t k = first; k <= last && least > -HUGE_VAL; ++k) kept += worth.of(least, k);
       } else if (least > -HUGE_VAL) {
         kept += worth.of(least, last);
       }
