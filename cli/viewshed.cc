@@ -163,7 +163,7 @@ class ViewshedRun {
         static_cast<std::size_t>(grid.columns()) * static_cast<std::size_t>(grid.rows());
     if (measures_heights()) {
       least_.emplace(grid);
-      eye_heights_m_.resize(samples);
+      if (!options_.each_folder.empty()) eye_heights_m_.resize(samples);
     } else {
       sight_ = LargeArray<Seen>(samples);
     }
@@ -183,7 +183,9 @@ class ViewshedRun {
     const auto earth = ground_.dem.frame->earth_frame();
     const ViewshedEye eye{from.at.position, from.target_height_m, from.limits};
     SweepCounts counts;
-    if (least_) {
+    if (least_ && options_.each_folder.empty()) {
+      least_->lower(ground_.grid, earth, eye, &counts);
+    } else if (least_) {
       window_ = heights_from(ground_.grid, earth, eye, eye_heights_m_, &counts);
       least_->add(window_, eye_heights_m_);
     } else {

@@ -13,6 +13,7 @@
 #include "core/threads/parallel_for.h"
 #include "core/viewshed/bin_history.h"
 #include "core/viewshed/line_kernels.h"
+#include "core/viewshed/ray_climb.h"
 
 namespace scarp {
 namespace {
@@ -24,6 +25,10 @@ constexpr double kNearCells = 1.5;
 /// s of a sample is a double rounded to float (2^-24 of itself), compared with another such one;
 /// 2^-20 leaves room for the arithmetic before.
 constexpr float kSlopeMargin = 0x1p-20F;
+
+/// GridSight::least_z_m rounds up by less than this, metres: nearer to the ground it is judged
+/// whether that is seen.
+constexpr double kNearGroundM = 1e-3;
 
 constexpr std::int32_t kFirstBins = 8;
 
@@ -45,7 +50,8 @@ struct SweepGround {
   /// off their grid lines.
   double steepest_m = 0;
 
-  SweepGround(const GroundGrid& grid, const PlanFrame& frame, double target_height_m);
+  SweepGround(const GroundGrid& grid, const PlanFrame& frame, double target_height_m,
+              const SampleWindow& window);
 };
 
 namespace {
@@ -58,14 +64,20 @@ double unevenness(const std::vector<double>& places) {
   return most;
 }
 
-double steepest_step_m(const GroundGrid& grid) {
-  std::vector<std::int64_t> of_row(static_cast<std::size_t>(grid.rows()));
+/// Around the samples of a window and those beside them.
+double steepest_step_m(const GroundGrid& grid, const SampleWindow& window) {
+  constexpr std::int32_t kBeside = 2;
+  const std::int32_t first_row = std::max(0, window.first_row - kBeside);
+  const std::int32_t last_row = std::min(grid.rows() - 1, window.last_row + kBeside);
+  const std::int32_t first_column = std::max(0, window.first_column - kBeside);
+  const std::int32_t last_column = std::min(grid.columns() - 1, window.last_column + kBeside);
+  std::vector<std::int64_t> of_row(static_cast<std::size_t>(last_row - first_row + 1));
   parallel_for(of_row.size(), [&](std::size_t r) {
-    const auto row = static_cast<std::int32_t>(r);
+    const auto row = first_row + static_cast<std::int32_t>(r);
     const std::int32_t* here = grid.row_steps(row);
     const std::int32_t* below = row + 1 < grid.rows() ? grid.row_steps(row + 1) : here;
     std::int64_t most = 0;
-    for (std::int32_t c = 0; c < grid.columns(); ++c) {
+    for (std::int32_t c = first_column; c <= last_column; ++c) {
       if (here[c] == GroundGrid::kVoid) continue;
       for (const std::int32_t next : {c + 1 < grid.columns() ? here[c + 1] : here[c], below[c]})
         if (next != GroundGrid::kVoid)
@@ -78,7 +90,8 @@ double steepest_step_m(const GroundGrid& grid) {
 
 }  // namespace
 
-SweepGround::SweepGround(const GroundGrid& grid, const PlanFrame& frame, double target_height_m) {
+SweepGround::SweepGround(const GroundGrid& grid, const PlanFrame& frame, double target_height_m,
+                         const SampleWindow& window) {
   if (const auto* separable = std::get_if<SeparablePlacement>(&grid.placement())) {
     for (const double x : separable->x_of_column_m)
       across_of_column.push_back(frame.across(x, frame.eye_y_m));
@@ -87,7 +100,7 @@ SweepGround::SweepGround(const GroundGrid& grid, const PlanFrame& frame, double 
     uneven_samples = std::max(unevenness(across_of_column), unevenness(down_of_row));
   }
   if (target_height_m != 0 && std::holds_alternative<BlockPlacement>(grid.placement()))
-    steepest_m = steepest_step_m(grid);
+    steepest_m = steepest_step_m(grid, window);
 }
 
 /// The picture of a grid line: its samples around the part.
@@ -163,7 +176,7 @@ class PartSweep::Run {
  public:
   /// Either result or least_m is empty.
   Run(const PartSweep& sweep, const SweepPart& part, std::span<Seen> result,
-      std::span<float> least_m);
+      std::span<float> least_m, const LeastSoFar* so_far = nullptr);
   SweepCounts run();
 
  private:
@@ -227,7 +240,13 @@ class PartSweep::Run {
   void decide(const Line& line, const Line* before);
   void climb(const Line& line, const Line* before);
   float climb_all(std::int32_t line, std::int32_t i);
-  float climb_in_bin(std::int32_t line, std::int32_t i, std::size_t bin);
+  float climb_to(const Line& line, const Line* before, std::int32_t k, float enough_m);
+  float climb_in_bin(const Line& line, std::int32_t k, std::size_t bin, float enough_m);
+  bool is_blocked_in_bin(const Line& line, std::int32_t k, std::size_t bin);
+  bool is_enough(double z_m, const Line& line, std::int32_t k, float enough_m) const;
+  void offer(std::int32_t line, std::int32_t i, float height_m);
+  void mark_top(std::int32_t line, const float* up);
+  std::pair<double, double> place_of(const Line& line, std::int32_t k) const;
   float height_up_to(double z_m, std::int32_t line, std::int32_t i) const;
   std::pair<std::int32_t, std::int32_t> own_range(const Line& line) const;
   void take_targets(const Line& line);
@@ -249,6 +268,7 @@ class PartSweep::Run {
   SampleWindow window_;
   std::span<Seen> result_;
   std::span<float> least_m_;
+  const LeastSoFar* so_far_;  ///< null where every height is wanted
   SweepPart part_;
 
   bool over_columns_ = true;
@@ -261,6 +281,7 @@ class PartSweep::Run {
   /// Bounds of the horizon by bin.
   std::int32_t bins_ = kFirstBins;
   std::vector<float> low_, high_;
+  std::vector<std::int32_t> top_;  ///< line that reaches highest so far; for heights only
   std::vector<std::uint8_t> some_void_, all_void_;
   BinHistory history_;
 
@@ -282,7 +303,7 @@ class PartSweep::Run {
 };
 
 PartSweep::Run::Run(const PartSweep& sweep, const SweepPart& part, std::span<Seen> result,
-                    std::span<float> least_m)
+                    std::span<float> least_m, const LeastSoFar* so_far)
     : sight_(sweep.sight_),
       grid_(sight_.grid()),
       frame_(sight_.frame()),
@@ -291,10 +312,12 @@ PartSweep::Run::Run(const PartSweep& sweep, const SweepPart& part, std::span<See
       window_(sweep.window_),
       result_(result),
       least_m_(least_m),
+      so_far_(so_far),
       part_(part),
       uneven_samples_(ground_.uneven_samples),
       low_(kFirstBins, kNoGround),
       high_(kFirstBins, kNoGround),
+      top_(kFirstBins, -1),
       some_void_(kFirstBins, 0),
       all_void_(kFirstBins, 0) {
   over_columns_ = part.wedge == SweepPart::kEast || part.wedge == SweepPart::kWest;
@@ -397,7 +420,7 @@ void PartSweep::Run::sweep_near(std::int32_t line, bool judge_targets) {
       if (least_m_.empty())
         result_[result_index(line, i)] = judge(line, i);
       else
-        least_m_[result_index(line, i)] = climb_all(line, i);
+        offer(line, i, climb_all(line, i));
     }
   }
   std::copy(edge_high_.begin(), edge_high_.end(), up);
@@ -406,6 +429,7 @@ void PartSweep::Run::sweep_near(std::int32_t line, bool judge_targets) {
     low_[b] = std::max(low_[b], line_low_[b]);
     high_[b] = std::max(high_[b], edge_high_[b]);
   }
+  mark_top(line, up);
 }
 
 void PartSweep::Run::add_near_segment(const Position& u, bool u_known, const Position& v,
@@ -471,6 +495,7 @@ void PartSweep::Run::halve_bins() {
   };
   split(low_);
   split(high_);
+  split(top_);
   split(some_void_);
   split(all_void_);
   bins_ *= 2;
@@ -766,51 +791,150 @@ float PartSweep::Run::height_up_to(double z_m, std::int32_t line, std::int32_t i
 float PartSweep::Run::climb_all(std::int32_t line, std::int32_t i) {
   ++counts_.traced_whole;
   bool over_void = false;
-  const double z_m = over_columns_ ? sight_.least_z_m(position(line, i), line, i, over_void)
-                                   : sight_.least_z_m(position(line, i), i, line, over_void);
-  return over_void ? std::numeric_limits<float>::quiet_NaN() : height_up_to(z_m, line, i);
+  const Position at = position(line, i);
+  const double z_m = over_columns_ ? sight_.least_z_m(at, line, i, over_void)
+                                   : sight_.least_z_m(at, i, line, over_void);
+  if (over_void) return std::numeric_limits<float>::quiet_NaN();
+  if (std::abs(z_m - at.z_m) > kNearGroundM) return height_up_to(z_m, line, i);
+  // So near to the ground, whether it is seen is a matter for exact arithmetic.
+  const Seen seen = over_columns_ ? sight_.judge(at, line, i) : sight_.judge(at, i, line);
+  return seen == Seen::kVisible ? 0 : height_up_to(std::max(z_m, at.z_m + kClimbErrorM), line, i);
 }
 
-/// The highest that any line makes it: those that may be above the highest so far are tried.
-float PartSweep::Run::climb_in_bin(std::int32_t line, std::int32_t i, std::size_t bin) {
+/// Keeps in mind which line reaches highest in each bin. Requires its bounds in high_.
+void PartSweep::Run::mark_top(std::int32_t line, const float* up) {
+  if (!least_m_.empty())
+    take_top(static_cast<std::size_t>(bins_), up, high_.data(), line, top_.data());
+}
+
+/// Forwards and sideways of a sample of the line that was filled last.
+std::pair<double, double> PartSweep::Run::place_of(const Line& line, std::int32_t k) const {
+  if (ground_.across_of_column.empty()) {
+    const auto n = static_cast<std::size_t>(k);
+    return over_columns_ ? std::pair(across_[n], down_[n]) : std::pair(down_[n], across_[n]);
+  }
+  const auto& along = over_columns_ ? ground_.down_of_row : ground_.across_of_column;
+  const auto& outwards = over_columns_ ? ground_.across_of_column : ground_.down_of_row;
+  return {outwards_ * outwards[static_cast<std::size_t>(line.number)],
+          along[static_cast<std::size_t>(line.first + k)]};
+}
+
+/// Is a target at a flattened height, and so all that is higher, at least enough_m above the
+/// ground?
+bool PartSweep::Run::is_enough(double z_m, const Line& line, std::int32_t k, float enough_m) const {
+  // Within a scene a height in the frame is never twice that on the normal.
+  const double rise_m = z_m - line.z_m[static_cast<std::size_t>(k)];
+  if (rise_m <= 0 || rise_m < enough_m) return false;
+  if (rise_m >= 2.0 * enough_m) return true;
+  const std::int32_t i = line.first + k;
+  return grid_.height_above_ground_m(over_columns_ ? line.number : i,
+                                     over_columns_ ? i : line.number, z_m) >= enough_m;
+}
+
+/// Does the ground block the sight of a sample? Decided exactly, as decide_seen does.
+bool PartSweep::Run::is_blocked_in_bin(const Line& line, std::int32_t k, std::size_t bin) {
+  const std::int32_t i = line.first + k;
+  const Position at = position(line.number, i);
+  const float s = line.s[static_cast<std::size_t>(k)];
+  const float least_s = s - 4 * kSlopeMargin * std::abs(s);
+  return history_.any_line(
+      static_cast<std::int32_t>(bin), bins_, least_s, [&](std::int32_t across) {
+        return sight_.is_blocked_between(at, over_columns_ ? line.number : i,
+                                         over_columns_ ? i : line.number, over_columns_, across,
+                                         across - outwards_);
+      });
+}
+
+/// The highest that any line makes it: first the line that reaches highest in the bin, then those
+/// that may still be above the highest so far.
+float PartSweep::Run::climb_in_bin(const Line& line, std::int32_t k, std::size_t bin,
+                                   float enough_m) {
   ++counts_.traced_part;
-  const Position at = position(line, i);
-  const double forwards = picture(at).forwards;
+  const std::int32_t i = line.first + k;
+  const auto [forwards, sideways] = place_of(line, k);
+  const double eye_z_m = sight_.eye().z_m;
+  const RayClimb ray(grid_, frame_, eye_z_m, over_columns_, outwards_, forwards, sideways);
   const auto below = [](float s) { return s - 4 * kSlopeMargin * std::abs(s); };
   float least_s = below(low_[bin]);
-  double least_z_m = -std::numeric_limits<double>::infinity();
+  double highest = -std::numeric_limits<double>::infinity();
+  const auto climb_over = [&](std::int32_t across) {
+    const double s =
+        std::abs(across - eye_line_) > RayClimb::kLeastLines
+            ? ray.slope_at(across)
+            : (sight_.least_z_between_m(position(line.number, i), over_columns_ ? line.number : i,
+                                        over_columns_ ? i : line.number, over_columns_, across,
+                                        across - outwards_) -
+               eye_z_m) /
+                  forwards;
+    if (s <= highest) return;
+    highest = s;
+    least_s = std::max(least_s, below(static_cast<float>(s)));
+  };
+  const std::int32_t top = top_[bin];
+  if (top >= 0) climb_over(top);
+  if (is_enough(eye_z_m + highest * forwards - kClimbErrorM, line, k, enough_m))
+    return std::numeric_limits<float>::quiet_NaN();
   history_.any_line(static_cast<std::int32_t>(bin), bins_, least_s, [&](std::int32_t across) {
-    const double z_m =
-        sight_.least_z_between_m(at, over_columns_ ? line : i, over_columns_ ? i : line,
-                                 over_columns_, across, across - outwards_);
-    if (z_m > least_z_m) {
-      least_z_m = z_m;
-      least_s = std::max(least_s, below(static_cast<float>((z_m - sight_.eye().z_m) / forwards)));
-    }
+    if (across != top) climb_over(across);
     return false;
   });
-  return height_up_to(least_z_m, line, i);
+  const double ground_m = line.z_m[static_cast<std::size_t>(k)];
+  const double z_m = eye_z_m + highest * forwards;
+  if (z_m < ground_m - kClimbErrorM) return 0;
+  if (z_m < ground_m + kClimbErrorM && !is_blocked_in_bin(line, k, bin)) return 0;
+  return height_up_to(std::max(z_m, ground_m) + kClimbErrorM, line.number, i);
+}
+
+/// Least height over a sample of a line; NaN where that is not known, or where it cannot be less
+/// than enough_m.
+float PartSweep::Run::climb_to(const Line& line, const Line* before, std::int32_t k,
+                               float enough_m) {
+  const auto n = static_cast<std::size_t>(k);
+  const std::int32_t i = line.first + k;
+  const auto bin =
+      static_cast<std::size_t>(std::clamp(line.t[n], 0.0F, static_cast<float>(bins_ - 1)));
+  if (!bounds_hold_) return climb_all(line.number, i);
+  if (all_void_[bin]) return std::numeric_limits<float>::quiet_NaN();
+  if (so_far_) {
+    const float s = low_[bin] - kSlopeMargin * std::abs(low_[bin]);
+    if (is_enough(sight_.eye().z_m + s * place_of(line, k).first, line, k, enough_m))
+      return std::numeric_limits<float>::quiet_NaN();
+  }
+  if (some_void_[bin] || (before && crosses_before(*before, i, line.t[n])))
+    return climb_all(line.number, i);
+  if (line.s[n] >= high_[bin] + kSlopeMargin * std::abs(line.s[n])) return 0;
+  return climb_in_bin(line, k, bin, enough_m);
+}
+
+/// Writes a height, or, where only lower ones are wanted, sees to it that it is one.
+void PartSweep::Run::offer(std::int32_t line, std::int32_t i, float height_m) {
+  float& to = least_m_[result_index(line, i)];
+  if (!so_far_) {
+    to = height_m;
+    return;
+  }
+  if (to <= height_m || !std::isfinite(height_m)) return;
+  if (so_far_->limit)
+    height_m = so_far_->limit(over_columns_ ? line : i, over_columns_ ? i : line, height_m);
+  if (height_m < to || (std::isnan(to) && !std::isnan(height_m))) to = height_m;
 }
 
 /// decide, for heights: what is not seen on the ground climbs until it is.
 void PartSweep::Run::climb(const Line& line, const Line* before) {
   const auto [first, end] = own_range(line);
-  const auto bins = static_cast<float>(bins_);
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
   for (std::int32_t k = first; k < end; ++k) {
-    const auto n = static_cast<std::size_t>(k);
-    if (line.is_void[n]) continue;
+    if (line.is_void[static_cast<std::size_t>(k)]) continue;
     ++counts_.targets;
     const std::int32_t i = line.first + k;
-    const auto bin = static_cast<std::size_t>(std::clamp(line.t[n], 0.0F, bins - 1));
-    float& to = least_m_[result_index(line.number, i)];
-    if (bounds_hold_ && all_void_[bin])
-      to = std::numeric_limits<float>::quiet_NaN();
-    else if (!bounds_hold_ || some_void_[bin] || (before && crosses_before(*before, i, line.t[n])))
-      to = climb_all(line.number, i);
-    else if (line.s[n] >= high_[bin] + kSlopeMargin * std::abs(line.s[n]))
-      to = 0;
-    else
-      to = climb_in_bin(line.number, i, bin);
+    float enough_m = kInfinity;
+    if (so_far_) {
+      const float so_far_m = least_m_[result_index(line.number, i)];
+      if (so_far_m <= 0) continue;
+      if (!std::isnan(so_far_m)) enough_m = so_far_m;
+    }
+    const float height_m = climb_to(line, before, k, enough_m);
+    if (!so_far_ || !std::isnan(height_m)) offer(line.number, i, height_m);
   }
 }
 
@@ -856,6 +980,7 @@ void PartSweep::Run::add_whole(const Line& line, const Line* before) {
                   edge_before_.data(), this_s_.data(), next_s_.data(), edge_low_.data(),
                   edge_high_.data(), up, low_.data(), high_.data()))
     bounds_hold_ = false;
+  mark_top(line.number, up);
   history_.end_line();
 }
 
@@ -866,8 +991,9 @@ void PartSweep::Run::add_in_pieces(const Line& line, const Line* before) {
   if (before) raise_segments(*before, line, up);
   raise_line(line, up);
   if (line.has_void) mark_void(line);
-  history_.end_line();
   take_maximum(static_cast<std::size_t>(bins_), up, high_.data());
+  mark_top(line.number, up);
+  history_.end_line();
 }
 
 /// The segments between the last line and this one: each is taken as high as its higher end in
@@ -1007,6 +1133,11 @@ SweepCounts PartSweep::run_heights(const SweepPart& part, std::span<float> least
   return Run(*this, part, {}, least_m).run();
 }
 
+SweepCounts PartSweep::lower_heights(const SweepPart& part, std::span<float> least_m,
+                                     const LeastSoFar& so_far) {
+  return Run(*this, part, {}, least_m, &so_far).run();
+}
+
 namespace {
 
 constexpr std::size_t kWedges = 4;
@@ -1068,7 +1199,7 @@ SweepCounts sweep_viewshed(const GroundGrid& grid, const Position& eye, double t
          static_cast<std::size_t>(grid.columns()) * static_cast<std::size_t>(grid.rows()));
   if (window.last_column < window.first_column || window.last_row < window.first_row) return {};
   const GridSight sight(grid, eye);
-  const SweepGround ground(grid, sight.frame(), target_height_m);
+  const SweepGround ground(grid, sight.frame(), target_height_m, window);
   fill_window(grid, window, Seen::kUnknown, result);
   SweepCounts counts = for_parts([&](const SweepPart& part) {
     return PartSweep(sight, ground, target_height_m, window).run(part, result);
@@ -1082,20 +1213,50 @@ SweepCounts sweep_viewshed(const GroundGrid& grid, const Position& eye, double t
   return counts;
 }
 
+namespace {
+
+/// Least height over the sample under the eye.
+float height_under(const GroundGrid& grid, const Position& eye, const Under& under) {
+  const bool above = grid.at(under.column, under.row).z_m <= eye.z_m;
+  return above ? 0 : std::numeric_limits<float>::infinity();
+}
+
+}  // namespace
+
 SweepCounts sweep_heights(const GroundGrid& grid, const Position& eye, const SampleWindow& window,
                           std::span<float> least_m) {
   assert(least_m.size() ==
          static_cast<std::size_t>(grid.columns()) * static_cast<std::size_t>(grid.rows()));
   if (window.last_column < window.first_column || window.last_row < window.first_row) return {};
   const GridSight sight(grid, eye);
-  const SweepGround ground(grid, sight.frame(), 0);
+  const SweepGround ground(grid, sight.frame(), 0, window);
   fill_window(grid, window, std::numeric_limits<float>::quiet_NaN(), least_m);
   SweepCounts counts = for_parts([&](const SweepPart& part) {
     return PartSweep(sight, ground, 0, window).run_heights(part, least_m);
   });
   if (const auto under = sample_under(sight, window)) {
-    const bool above = grid.at(under->column, under->row).z_m <= eye.z_m;
-    least_m[index_in(grid, *under)] = above ? 0 : std::numeric_limits<float>::infinity();
+    least_m[index_in(grid, *under)] = height_under(grid, eye, *under);
+    ++counts.targets;
+  }
+  return counts;
+}
+
+SweepCounts lower_heights(const GroundGrid& grid, const Position& eye, const SampleWindow& window,
+                          const HeightLimit& limit, std::span<float> least_m) {
+  assert(least_m.size() ==
+         static_cast<std::size_t>(grid.columns()) * static_cast<std::size_t>(grid.rows()));
+  if (window.last_column < window.first_column || window.last_row < window.first_row) return {};
+  const GridSight sight(grid, eye);
+  const SweepGround ground(grid, sight.frame(), 0, window);
+  const LeastSoFar so_far{limit};
+  SweepCounts counts = for_parts([&](const SweepPart& part) {
+    return PartSweep(sight, ground, 0, window).lower_heights(part, least_m, so_far);
+  });
+  if (const auto under = sample_under(sight, window)) {
+    float& to = least_m[index_in(grid, *under)];
+    const float found_m = height_under(grid, eye, *under);
+    if (std::isfinite(found_m))
+      to = std::fmin(to, limit ? limit(under->column, under->row, found_m) : found_m);
     ++counts.targets;
   }
   return counts;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -21,8 +22,17 @@ struct SweepPart {
   std::int32_t number = 0;  ///< [0, kPartsInWedge), by rising tangent
 };
 
+/// What a least height becomes under limits other than the ground: the same, more, or NaN where no
+/// height will do. Called from several threads; empty where there are none.
+using HeightLimit = std::function<float(std::int32_t column, std::int32_t row, float least_m)>;
+
 /// What all parts of a sweep share; made by sweep_viewshed.
 struct SweepGround;
+
+/// How heights are taken that are to be lower than those of the eyes before; see lower_heights.
+struct LeastSoFar {
+  HeightLimit limit;
+};
 
 /// How the samples of a sweep were decided.
 struct SweepCounts {
@@ -69,6 +79,11 @@ class PartSweep {
   ///                      ground, infinite above an eye under ground
   SweepCounts run_heights(const SweepPart& part, std::span<float> least_m);
 
+  /// The same where only what is lower than the heights so far is of interest: nothing is compared
+  /// exactly whose lower bound is above those already.
+  SweepCounts lower_heights(const SweepPart& part, std::span<float> least_m,
+                            const LeastSoFar& so_far);
+
  private:
   struct Line;
   class Run;
@@ -79,9 +94,18 @@ class PartSweep {
   SampleWindow window_;
 };
 
-/// PartSweep::run_heights for all parts; NaN where a sample is void.
+/// PartSweep::run_heights for all parts; NaN where a sample is void. 0 exactly where sweep_viewshed
+/// says kVisible of targets on the ground.
 SweepCounts sweep_heights(const GroundGrid& grid, const Position& eye, const SampleWindow& window,
                           std::span<float> least_m);
+
+/// Lowers the heights so far of several eyes to those of one more, within limits.
+/// @param least_m[in, out]  [rows * columns] NaN where no eye has any; the lesser of what it is and
+///                          what sweep_heights finds, after limit, where that is finite
+/// Cost: with many eyes little more than sweep_viewshed, because most samples are seen lower
+/// already.
+SweepCounts lower_heights(const GroundGrid& grid, const Position& eye, const SampleWindow& window,
+                          const HeightLimit& limit, std::span<float> least_m);
 
 /// All parts on all threads. The same bits for any number of threads.
 /// @param result[out]  [rows * columns]; the window is written, kUnknown where the sample is void

@@ -13,7 +13,7 @@ namespace {
 /// on all threads.
 template <typename Body>
 void for_rows(const SampleWindow& window, const Body& body) {
-  if (window.last_row < window.first_row) return;
+  if (window.last_row < window.first_row || window.last_column < window.first_column) return;
   constexpr std::int32_t kRowsPerTask = 32;
   const std::int32_t rows = window.last_row - window.first_row + 1;
   parallel_for(static_cast<std::size_t>((rows + kRowsPerTask - 1) / kRowsPerTask),
@@ -33,7 +33,8 @@ void keep_within(const GroundGrid& grid, const EyeBearings& bearings, const View
       Seen& at = sight[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.columns()) +
                        static_cast<std::size_t>(column)];
       if (at == Seen::kHidden || !grid.is_known(column, row)) continue;
-      if (!within(eye.limits, bearings.to(grid.raised(column, row, eye.target_height_m))))
+      const Position target = grid.raised(column, row, eye.target_height_m);
+      if (!bearings.surely_within(eye.limits, target) && !within(eye.limits, bearings.to(target)))
         at = Seen::kHidden;
     }
   });
@@ -53,6 +54,9 @@ float climb_to_pitch(const GroundGrid& grid, const EyeBearings& bearings, const 
     return bearings.to(grid.raised(column, row, height_m)).pitch_rad;
   };
   constexpr float kNever = std::numeric_limits<float>::quiet_NaN();
+  if (limits.min_pitch_rad <= ViewLimits().min_pitch_rad &&
+      limits.max_pitch_rad >= ViewLimits().max_pitch_rad)
+    return least_m;
   constexpr double kHighestM = 100'000;
   if (pitch_at(least_m) < limits.min_pitch_rad) {
     double low_m = least_m, high_m = kHighestM;
@@ -64,6 +68,19 @@ float climb_to_pitch(const GroundGrid& grid, const EyeBearings& bearings, const 
     least_m = std::nextafter(static_cast<float>(high_m), std::numeric_limits<float>::infinity());
   }
   return pitch_at(least_m) > limits.max_pitch_rad ? kNever : least_m;
+}
+
+/// The least height at a sample within an eye's limits, from that which the ground leaves.
+float within_limits(const GroundGrid& grid, const EyeBearings& bearings, const ViewLimits& limits,
+                    std::int32_t column, std::int32_t row, float least_m) {
+  ViewLimits aside = limits;
+  aside.min_pitch_rad = ViewLimits().min_pitch_rad;
+  aside.max_pitch_rad = ViewLimits().max_pitch_rad;
+  const Position ground = grid.at(column, row);
+  if (bearings.surely_within(limits, ground)) return least_m;
+  return within(aside, bearings.to(ground))
+             ? climb_to_pitch(grid, bearings, limits, column, row, least_m)
+             : std::numeric_limits<float>::quiet_NaN();
 }
 
 }  // namespace
@@ -80,15 +97,23 @@ SampleWindow heights_from(const GroundGrid& grid, const std::optional<EarthFrame
                           static_cast<std::size_t>(column)];
       if (std::isinf(at)) at = std::numeric_limits<float>::quiet_NaN();
       if (std::isnan(at) || !eye.limits.any()) continue;
-      ViewLimits aside = eye.limits;
-      aside.min_pitch_rad = ViewLimits().min_pitch_rad;
-      aside.max_pitch_rad = ViewLimits().max_pitch_rad;
-      at = within(aside, bearings.to(grid.at(column, row)))
-               ? climb_to_pitch(grid, bearings, eye.limits, column, row, at)
-               : std::numeric_limits<float>::quiet_NaN();
+      at = within_limits(grid, bearings, eye.limits, column, row, at);
     }
   });
   return window;
+}
+
+void LeastHeight::lower(const GroundGrid& grid, const std::optional<EarthFrame>& earth,
+                        const ViewshedEye& eye, SweepCounts* counts) {
+  const EyeBearings bearings(eye.position, earth);
+  HeightLimit limit;
+  if (eye.limits.any())
+    limit = [&](std::int32_t column, std::int32_t row, float least_m) {
+      return within_limits(grid, bearings, eye.limits, column, row, least_m);
+    };
+  const SweepCounts found =
+      lower_heights(grid, eye.position, window_of(grid, eye, bearings), limit, least_m_);
+  if (counts) *counts = found;
 }
 
 LeastHeight::LeastHeight(const GroundGrid& grid)

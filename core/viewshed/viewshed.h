@@ -69,6 +69,10 @@ class EyeCount {
 class LeastHeight {
  public:
   explicit LeastHeight(const GroundGrid& grid);
+  /// Takes in what heights_from finds for one more eye, without a raster of its own.
+  /// Cost: with many eyes near that of view_from; see lower_heights.
+  void lower(const GroundGrid& grid, const std::optional<EarthFrame>& earth, const ViewshedEye& eye,
+             SweepCounts* counts = nullptr);
   void add(const SampleWindow& window, std::span<const float> least_m);
   std::span<float> heights_m() { return least_m_; }
   std::span<const float> heights_m() const { return least_m_; }

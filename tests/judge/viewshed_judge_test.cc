@@ -112,6 +112,7 @@ void expect_equal(const std::string& file, const DemOptions& options) {
   const auto columns = static_cast<std::size_t>(grid.columns());
   const std::size_t cells = columns * static_cast<std::size_t>(grid.rows());
   std::vector<Seen> judged(cells), swept(cells);
+  std::vector<float> least_m(cells);
   for (const Eye& at : eyes_of(grid)) {
     for (const auto& [eye_m, target_m] : kHeights) {
       const bool between = target_m > 0 && at.column > 0 && at.row > 0;
@@ -124,6 +125,12 @@ void expect_equal(const std::string& file, const DemOptions& options) {
         EXPECT_EQ(judged[i], swept[i])
             << "eye over " << at.column << "," << at.row << " at " << eye_m << " m, target "
             << target_m << " m: column " << i % columns << " row " << i / columns;
+      if (target_m > 0) continue;
+      sweep_heights(grid, eye, whole_window(grid), least_m);
+      for (std::size_t i = 0; i < cells; ++i)
+        EXPECT_EQ(judged[i] == Seen::kVisible, least_m[i] == 0)
+            << "eye over " << at.column << "," << at.row << " at " << eye_m << " m: column "
+            << i % columns << " row " << i / columns << " least height " << least_m[i];
     }
   }
 }
