@@ -101,13 +101,19 @@ void add_build(CLI::App& app, BuildOptions& o, std::function<int()>& run) {
   c->callback([&] { run = [&o] { return run_build(o); }; });
 }
 
+void add_sources(CLI::App& command, std::vector<std::string>& sources) {
+  command.add_option("source", sources, "A scene, or any rasters of heights that GDAL reads")
+      ->required();
+}
+
 void add_viewshed(CLI::App& app, ViewshedOptions& o, std::function<int()>& run) {
-  CLI::App* c = app.add_subcommand("viewshed", "What one eye or several see of a DEM, exactly");
+  CLI::App* c =
+      app.add_subcommand("viewshed", "What one eye or several see of a DEM or a scene, exactly");
   c->footer(
       "Example:\n  scarp viewshed alps.tif --observer 8.65,46.55,2 --crs OGC:CRS84 -o seen.tif\n"
       "1 visible, 0 hidden, 255 unknown (void). On the ellipsoid wherever the DEM has a CRS, in\n"
       "degrees too. Several DEMs that share their cells make one mosaic.");
-  c->add_option("dem", o.dem_files, "Any rasters that GDAL reads")->required();
+  add_sources(*c, o.sources);
   c->add_option("-o,--output", o.output, "The raster of the answer, a cloud-optimised GeoTIFF")
       ->required();
   c->add_option_function<std::vector<std::string>>(
@@ -151,11 +157,6 @@ void add_viewshed(CLI::App& app, ViewshedOptions& o, std::function<int()>& run) 
   add_surface(*c, o.dem);
   add_common(*c, o.common);
   c->callback([&] { run = [&o] { return run_viewshed(o); }; });
-}
-
-void add_sources(CLI::App& command, std::vector<std::string>& sources) {
-  command.add_option("source", sources, "A scene, or any rasters of heights that GDAL reads")
-      ->required();
 }
 
 void add_sight(CLI::App& app, SightOptions& o, std::function<int()>& run) {

@@ -12,8 +12,8 @@
 
 #include "cli/build/layers.h"
 #include "cli/commands.h"
-#include "cli/ground_eye.h"
 #include "cli/stages.h"
+#include "cli/view_source.h"
 #include "core/error/error.h"
 #include "core/memory/large_array.h"
 #include "core/threads/parallel_for.h"
@@ -58,14 +58,14 @@ ViewLimits limits_of(double min_distance_m, std::optional<double> max_distance_m
 }
 
 /// An eye from a file; the options hold for what it leaves out.
-RunEye eye_of(const ObserverRecord& record, const ViewshedOptions& options, const Ground& ground) {
+RunEye eye_of(const ObserverRecord& record, const ViewshedOptions& options,
+              const ViewSource& source) {
   RunEye eye;
   const double height_m = record.height_m.value_or(TypedPosition().height_m);
-  eye.at = place_eye({record.x, record.y, record.elevation_m.value_or(height_m)},
-                     record.elevation_m.has_value(),
-                     fmt::format("{}{}{:.10g},{:.10g}", record.name, record.name.empty() ? "" : " ",
-                                 record.x, record.y),
-                     ground);
+  eye.at = source.place({record.x, record.y, record.elevation_m.value_or(height_m)},
+                        record.elevation_m.has_value(),
+                        fmt::format("{}{}{:.10g},{:.10g}", record.name,
+                                    record.name.empty() ? "" : " ", record.x, record.y));
   eye.target_height_m = record.target_height_m.value_or(options.target_height_m);
   Range azimuth_deg = options.azimuth_deg, pitch_deg = options.pitch_deg;
   if (record.azimuth_from_deg)
@@ -141,16 +141,16 @@ class ViewshedRun {
   void read(const Progress& progress) {
     DemOptions dem = options_.dem;
     dem.memory_budget_bytes = options_.common.memory_budget_bytes;
-    ground_ = read_ground(options_.dem_files, dem, progress);
+    source_.emplace(options_.sources, options_.obstacles, dem, progress);
     for (const TypedPosition& typed : options_.observers)
-      eyes_.push_back({place_eye(typed, options_.crs, ground_), options_.target_height_m,
+      eyes_.push_back({source_->place(typed, options_.crs), options_.target_height_m,
                        limits_of(options_.min_distance_m, options_.max_distance_m,
                                  options_.azimuth_deg, options_.pitch_deg),
                        ""});
     if (options_.observers_file.empty()) return;
-    const std::string& wkt = ground_.dem.frame->description().crs_wkt;
+    const std::string& wkt = source_->dem().frame->description().crs_wkt;
     for (const ObserverRecord& record : read_observers(options_.observers_file, wkt, options_.crs))
-      eyes_.push_back(eye_of(record, options_, ground_));
+      eyes_.push_back(eye_of(record, options_, *source_));
   }
 
   bool measures_heights() const {
@@ -158,7 +158,7 @@ class ViewshedRun {
   }
 
   void see(const Progress& progress) {
-    const GroundGrid& grid = ground_.grid;
+    const GroundGrid& grid = source_->samples();
     const std::size_t samples =
         static_cast<std::size_t>(grid.columns()) * static_cast<std::size_t>(grid.rows());
     if (measures_heights()) {
@@ -180,16 +180,16 @@ class ViewshedRun {
   }
 
   void see_from(const RunEye& from) {
-    const auto earth = ground_.dem.frame->earth_frame();
+    const auto earth = source_->dem().frame->earth_frame();
     const ViewshedEye eye{from.at.position, from.target_height_m, from.limits};
     SweepCounts counts;
     if (least_ && options_.each_folder.empty()) {
-      least_->lower(ground_.grid, earth, eye, &counts);
+      least_->lower(source_->ground(), earth, eye, &counts);
     } else if (least_) {
-      window_ = heights_from(ground_.grid, earth, eye, eye_heights_m_, &counts);
+      window_ = heights_from(source_->ground(), earth, eye, eye_heights_m_, &counts);
       least_->add(window_, eye_heights_m_);
     } else {
-      window_ = view_from(ground_.grid, earth, eye, sight_.span(), &counts);
+      window_ = view_from(source_->ground(), earth, eye, sight_.span(), &counts);
       if (count_) count_->add(window_, sight_.span());
       if (any_) any_->add(window_, sight_.span());
     }
@@ -208,11 +208,11 @@ class ViewshedRun {
     if (name.empty() || name.front() == '.') name = fmt::format("{:04}", i + 1);
     const std::string path = fmt::format("{}/{}.tif", options_.each_folder, name);
     if (least_) {
-      LeastHeight alone(ground_.grid);
+      LeastHeight alone(source_->samples());
       alone.add(window_, eye_heights_m_);
       write_heights(path, alone.heights_m(), i, i + 1);
     } else {
-      AnyEye alone(ground_.grid);
+      AnyEye alone(source_->samples());
       alone.add(window_, sight_.span());
       write_values(path, alone.seen(), i, i + 1);
     }
@@ -224,7 +224,7 @@ class ViewshedRun {
     if (least_) {
       write_heights(options_.output, least_->heights_m(), 0, eyes_.size());
     } else if (count_) {
-      RasterLayer layer = layer_over(ground_.dem, count_->counts(), "eyes that see it");
+      RasterLayer layer = layer_over(source_->dem(), count_->counts(), "eyes that see it");
       layer.nodata = EyeCount::kVoid;
       layer.metadata["VALUES"] = "number of eyes that see it; 4294967295 void";
       write_layer(options_.output, layer, 0, eyes_.size());
@@ -250,10 +250,10 @@ class ViewshedRun {
       std::transform(sight.begin(), sight.end(), gdal_values_.begin(), [](Seen s) {
         return static_cast<std::uint8_t>(s == Seen::kVisible ? 255 : 0);
       });
-      layer = layer_over(ground_.dem, std::span<const std::uint8_t>(gdal_values_), "visible");
+      layer = layer_over(source_->dem(), std::span<const std::uint8_t>(gdal_values_), "visible");
       layer.metadata["VALUES"] = "255 visible, 0 hidden or unknown";
     } else {
-      layer = layer_over(ground_.dem, bytes, "visible");
+      layer = layer_over(source_->dem(), bytes, "visible");
       layer.nodata = 255;
       layer.colours = {{{70, 80, 96, 255}, {250, 196, 60, 255}}};
       layer.metadata["VALUES"] = "1 visible, 0 hidden, 255 unknown";
@@ -265,7 +265,7 @@ class ViewshedRun {
                      std::size_t end) {
     const bool as_elevation = options_.mode == ViewshedMode::kDem;
     if (as_elevation) add_ground(least_m);
-    RasterLayer layer = layer_over(ground_.dem, std::span<const float>(least_m),
+    RasterLayer layer = layer_over(source_->dem(), std::span<const float>(least_m),
                                    as_elevation ? "least elevation seen" : "least height seen");
     layer.unit = "m";
     layer.nodata = std::numeric_limits<double>::quiet_NaN();
@@ -279,8 +279,8 @@ class ViewshedRun {
 
   /// Heights above ground become heights above the datum of the data, rounded up.
   void add_ground(std::span<float> least_m) const {
-    const GroundGrid& grid = ground_.grid;
-    const Dem& dem = ground_.dem;
+    const GroundGrid& grid = source_->samples();
+    const Dem& dem = source_->dem();
     const bool has_geoid = !dem.frame->description().geoid_file.empty();
     parallel_for(static_cast<std::size_t>(grid.rows()), [&](std::size_t r) {
       const auto row = static_cast<std::int32_t>(r);
@@ -302,20 +302,20 @@ class ViewshedRun {
   /// What the run was, for whoever opens the raster.
   void describe(std::map<std::string, std::string>& metadata, std::size_t first,
                 std::size_t end) const {
-    const FrameDescription& frame = ground_.dem.frame->description();
+    const FrameDescription& frame = source_->dem().frame->description();
     constexpr std::size_t kMostNamed = 32;
     std::string observers;
     for (std::size_t i = first; i < std::min(end, first + kMostNamed); ++i)
       observers += fmt::format("{}{:.10g},{:.10g},{:.3f}asl", i > first ? " " : "",
                                eyes_[i].at.map.x, eyes_[i].at.map.y, eyes_[i].at.map.height_m);
     metadata["MODE"] = name_of(options_.mode);
-    metadata["SURFACE"] = "grid";
+    metadata["SURFACE"] = source_->surface();
     metadata["EARTH"] = frame.earth == Earth::kFlat ? "flat" : "ellipsoid";
     metadata["REFRACTION"] = fmt::format("{:g}", frame.refraction);
     metadata["HEIGHTS"] = frame.earth == Earth::kFlat ? "above the map plane"
                           : frame.geoid_file.empty()  ? "taken as ellipsoidal"
                                                       : "geoid added";
-    metadata["HEIGHT_UNIT_OF_DEM"] = ground_.dem.height_unit;
+    metadata["HEIGHT_UNIT_OF_DEM"] = source_->dem().height_unit;
     metadata["OBSERVERS"] = std::to_string(end - first);
     metadata["OBSERVER"] = observers;
     if (!options_.observers_file.empty())
@@ -338,8 +338,8 @@ class ViewshedRun {
 
   nlohmann::json summary() const {
     nlohmann::json result = {{"output", options_.output},
-                             {"columns", ground_.grid.columns()},
-                             {"rows", ground_.grid.rows()},
+                             {"columns", source_->samples().columns()},
+                             {"rows", source_->samples().rows()},
                              {"observers", eyes_.size()}};
     if (least_) {
       const auto heights_m = least_->heights_m();
@@ -365,11 +365,11 @@ class ViewshedRun {
   }
 
   void print() const {
-    for (const std::string& warning : ground_.dem.warnings)
+    for (const std::string& warning : source_->dem().warnings)
       fmt::print(stderr, "scarp: warning: {}\n", warning);
     nlohmann::json result = summary();
     if (options_.common.json) {
-      result["warnings"] = ground_.dem.warnings;
+      result["warnings"] = source_->dem().warnings;
       result["decided"] = {{"targets", decided_.targets},
                            {"compared_with_part", decided_.traced_part},
                            {"judged_whole", decided_.traced_whole}};
@@ -395,7 +395,7 @@ class ViewshedRun {
 
   const ViewshedOptions& options_;
   Stages stages_;
-  Ground ground_;
+  std::optional<ViewSource> source_;
   std::vector<RunEye> eyes_;
   LargeArray<Seen> sight_;
   std::optional<AnyEye> any_;

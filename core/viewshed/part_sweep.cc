@@ -194,9 +194,14 @@ class PartSweep::Run {
     return over_columns_ ? window_.contains(line, i) : window_.contains(i, line);
   }
   Position target(std::int32_t line, std::int32_t i) const {
-    return over_columns_ ? grid_.raised(line, i, target_height_m_)
-                         : grid_.raised(i, line, target_height_m_);
+    return over_columns_ ? stands_.raised(line, i, target_height_m_)
+                         : stands_.raised(i, line, target_height_m_);
   }
+  /// The ground that a target stands on.
+  Position stand(std::int32_t line, std::int32_t i) const {
+    return over_columns_ ? stands_.at(line, i) : stands_.at(i, line);
+  }
+  bool raised() const { return target_height_m_ != 0 || apart_; }
   Seen judge(std::int32_t line, std::int32_t i) {
     ++counts_.traced_whole;
     return over_columns_ ? sight_.judge(target(line, i), line, i)
@@ -242,7 +247,7 @@ class PartSweep::Run {
   float climb_all(std::int32_t line, std::int32_t i);
   float climb_to(const Line& line, const Line* before, std::int32_t k, float enough_m);
   float climb_in_bin(const Line& line, std::int32_t k, std::size_t bin, float enough_m);
-  bool is_blocked_in_bin(const Line& line, std::int32_t k, std::size_t bin);
+  bool is_blocked_in_bin(const Line& line, std::int32_t k, std::size_t bin, float s);
   bool is_enough(double z_m, const Line& line, std::int32_t k, float enough_m) const;
   void offer(std::int32_t line, std::int32_t i, float height_m);
   void mark_top(std::int32_t line, const float* up);
@@ -261,7 +266,9 @@ class PartSweep::Run {
   void mark_void(const Line& line);
 
   const GridSight& sight_;
-  const GroundGrid& grid_;
+  const GroundGrid& grid_;    ///< what blocks
+  const GroundGrid& stands_;  ///< what targets stand on
+  const bool apart_;          ///< whether these are two
   const PlanFrame& frame_;
   const SweepGround& ground_;
   double target_height_m_;
@@ -306,6 +313,8 @@ PartSweep::Run::Run(const PartSweep& sweep, const SweepPart& part, std::span<See
                     std::span<float> least_m, const LeastSoFar* so_far)
     : sight_(sweep.sight_),
       grid_(sight_.grid()),
+      stands_(sweep.stands_),
+      apart_(&grid_ != &stands_),
       frame_(sight_.frame()),
       ground_(sweep.ground_),
       target_height_m_(sweep.target_height_m_),
@@ -639,7 +648,11 @@ void PartSweep::Run::take_targets(const Line& line) {
   target_t_.resize(count);
   target_s_.resize(count);
   raised_m_.resize(count);
-  if (std::holds_alternative<BlockPlacement>(grid_.placement())) {
+  if (apart_) {
+    for (std::size_t k = 0; k < count; ++k)
+      raised_m_[k] =
+          line.is_void[k] ? 0 : target(line.number, line.first + static_cast<std::int32_t>(k)).z_m;
+  } else if (std::holds_alternative<BlockPlacement>(grid_.placement())) {
     for_blocks(line.number, line.first, count,
                [&](const BlockPlacement::Block& block, std::size_t k, std::size_t length, double u,
                    double du, double v, double dv) {
@@ -685,7 +698,7 @@ Seen PartSweep::Run::decide_seen(const Line& line, const Line* before, std::int3
                                  Decision decision) {
   const auto n = static_cast<std::size_t>(k);
   const std::int32_t i = line.first + k;
-  const bool raised = target_height_m_ != 0;
+  const bool raised = this->raised();
   const float t = raised ? target_t_[n] : line.t[n], s = raised ? target_s_[n] : line.s[n];
   if (before && crosses_before(*before, i, t)) return judge(line.number, i);
   if (raised && !stands_free(target(line.number, i), line.number, i)) return judge(line.number, i);
@@ -730,7 +743,7 @@ void PartSweep::Run::decide(const Line& line, const Line* before) {
   if (first == end) return;
   const auto n = static_cast<std::size_t>(first);
   const auto count = static_cast<std::size_t>(end - first);
-  const bool raised = target_height_m_ != 0;
+  const bool raised = this->raised();
   if (raised) take_targets(line);
   decisions_.resize(line.t.size());
   classify(count, (raised ? target_t_ : line.t).data() + n,
@@ -780,9 +793,9 @@ void PartSweep::Run::decide(const Line& line, const Line* before) {
 float PartSweep::Run::height_up_to(double z_m, std::int32_t line, std::int32_t i) const {
   const std::int32_t column = over_columns_ ? line : i, row = over_columns_ ? i : line;
   if (z_m >= kLatticeReachM) return std::numeric_limits<float>::infinity();
-  if (z_m <= grid_.at(column, row).z_m) return 0;
+  if (z_m <= stands_.at(column, row).z_m) return 0;
   // A target is put on the lattice: one step up holds whichever way it is rounded.
-  const double height_m = grid_.height_above_ground_m(column, row, z_m) + kLatticeStepM;
+  const double height_m = stands_.height_above_ground_m(column, row, z_m) + kLatticeStepM;
   const auto rounded = static_cast<float>(height_m);
   return rounded < height_m ? std::nextafter(rounded, std::numeric_limits<float>::infinity())
                             : rounded;
@@ -791,7 +804,7 @@ float PartSweep::Run::height_up_to(double z_m, std::int32_t line, std::int32_t i
 float PartSweep::Run::climb_all(std::int32_t line, std::int32_t i) {
   ++counts_.traced_whole;
   bool over_void = false;
-  const Position at = position(line, i);
+  const Position at = stand(line, i);
   const double z_m = over_columns_ ? sight_.least_z_m(at, line, i, over_void)
                                    : sight_.least_z_m(at, i, line, over_void);
   if (over_void) return std::numeric_limits<float>::quiet_NaN();
@@ -823,19 +836,20 @@ std::pair<double, double> PartSweep::Run::place_of(const Line& line, std::int32_
 /// ground?
 bool PartSweep::Run::is_enough(double z_m, const Line& line, std::int32_t k, float enough_m) const {
   // Within a scene a height in the frame is never twice that on the normal.
-  const double rise_m = z_m - line.z_m[static_cast<std::size_t>(k)];
+  const std::int32_t i = line.first + k;
+  const double ground_m =
+      apart_ ? stand(line.number, i).z_m : line.z_m[static_cast<std::size_t>(k)];
+  const double rise_m = z_m - ground_m;
   if (rise_m <= 0 || rise_m < enough_m) return false;
   if (rise_m >= 2.0 * enough_m) return true;
-  const std::int32_t i = line.first + k;
-  return grid_.height_above_ground_m(over_columns_ ? line.number : i,
-                                     over_columns_ ? i : line.number, z_m) >= enough_m;
+  return stands_.height_above_ground_m(over_columns_ ? line.number : i,
+                                       over_columns_ ? i : line.number, z_m) >= enough_m;
 }
 
 /// Does the ground block the sight of a sample? Decided exactly, as decide_seen does.
-bool PartSweep::Run::is_blocked_in_bin(const Line& line, std::int32_t k, std::size_t bin) {
+bool PartSweep::Run::is_blocked_in_bin(const Line& line, std::int32_t k, std::size_t bin, float s) {
   const std::int32_t i = line.first + k;
-  const Position at = position(line.number, i);
-  const float s = line.s[static_cast<std::size_t>(k)];
+  const Position at = stand(line.number, i);
   const float least_s = s - 4 * kSlopeMargin * std::abs(s);
   return history_.any_line(
       static_cast<std::int32_t>(bin), bins_, least_s, [&](std::int32_t across) {
@@ -861,7 +875,7 @@ float PartSweep::Run::climb_in_bin(const Line& line, std::int32_t k, std::size_t
     const double s =
         std::abs(across - eye_line_) > RayClimb::kLeastLines
             ? ray.slope_at(across)
-            : (sight_.least_z_between_m(position(line.number, i), over_columns_ ? line.number : i,
+            : (sight_.least_z_between_m(stand(line.number, i), over_columns_ ? line.number : i,
                                         over_columns_ ? i : line.number, over_columns_, across,
                                         across - outwards_) -
                eye_z_m) /
@@ -878,10 +892,12 @@ float PartSweep::Run::climb_in_bin(const Line& line, std::int32_t k, std::size_t
     if (across != top) climb_over(across);
     return false;
   });
-  const double ground_m = line.z_m[static_cast<std::size_t>(k)];
+  const double ground_m = stand(line.number, i).z_m;
   const double z_m = eye_z_m + highest * forwards;
   if (z_m < ground_m - kClimbErrorM) return 0;
-  if (z_m < ground_m + kClimbErrorM && !is_blocked_in_bin(line, k, bin)) return 0;
+  if (z_m < ground_m + kClimbErrorM &&
+      !is_blocked_in_bin(line, k, bin, static_cast<float>((ground_m - eye_z_m) / forwards)))
+    return 0;
   return height_up_to(std::max(z_m, ground_m) + kClimbErrorM, line.number, i);
 }
 
@@ -902,7 +918,13 @@ float PartSweep::Run::climb_to(const Line& line, const Line* before, std::int32_
   }
   if (some_void_[bin] || (before && crosses_before(*before, i, line.t[n])))
     return climb_all(line.number, i);
-  if (line.s[n] >= high_[bin] + kSlopeMargin * std::abs(line.s[n])) return 0;
+  float s = line.s[n];
+  if (apart_) {
+    const Position at = stand(line.number, i), over = position(line.number, i);
+    if (at.x_m != over.x_m || at.y_m != over.y_m) return climb_all(line.number, i);
+    s = static_cast<float>((at.z_m - sight_.eye().z_m) / place_of(line, k).first);
+  }
+  if (s >= high_[bin] + kSlopeMargin * std::abs(s)) return 0;
   return climb_in_bin(line, k, bin, enough_m);
 }
 
@@ -1121,9 +1143,13 @@ void PartSweep::Run::sweep_line(std::int32_t line, bool is_first) {
   std::swap(line_, before_);
 }
 
-PartSweep::PartSweep(const GridSight& sight, const SweepGround& ground, double target_height_m,
-                     const SampleWindow& window)
-    : sight_(sight), ground_(ground), target_height_m_(target_height_m), window_(window) {}
+PartSweep::PartSweep(const GridSight& sight, const GroundGrid& stands, const SweepGround& ground,
+                     double target_height_m, const SampleWindow& window)
+    : sight_(sight),
+      stands_(stands),
+      ground_(ground),
+      target_height_m_(target_height_m),
+      window_(window) {}
 
 SweepCounts PartSweep::run(const SweepPart& part, std::span<Seen> result) {
   return Run(*this, part, result, {}).run();
@@ -1194,19 +1220,24 @@ std::size_t index_in(const GroundGrid& grid, const Under& under) {
 }  // namespace
 
 SweepCounts sweep_viewshed(const GroundGrid& grid, const Position& eye, double target_height_m,
-                           const SampleWindow& window, std::span<Seen> result) {
+                           const SampleWindow& window, std::span<Seen> result,
+                           const GroundGrid* stands) {
   assert(result.size() ==
          static_cast<std::size_t>(grid.columns()) * static_cast<std::size_t>(grid.rows()));
   if (window.last_column < window.first_column || window.last_row < window.first_row) return {};
   const GridSight sight(grid, eye);
-  const SweepGround ground(grid, sight.frame(), target_height_m, window);
+  // On grounds of their own targets stand off the grid's lines, however little they are raised.
+  const SweepGround ground(grid, sight.frame(), stands && stands != &grid ? 1 : target_height_m,
+                           window);
   fill_window(grid, window, Seen::kUnknown, result);
   SweepCounts counts = for_parts([&](const SweepPart& part) {
-    return PartSweep(sight, ground, target_height_m, window).run(part, result);
+    return PartSweep(sight, stands ? *stands : grid, ground, target_height_m, window)
+        .run(part, result);
   });
   if (const auto under = sample_under(sight, window)) {
-    result[index_in(grid, *under)] = sight.judge(
-        grid.raised(under->column, under->row, target_height_m), under->column, under->row);
+    result[index_in(grid, *under)] =
+        sight.judge((stands ? *stands : grid).raised(under->column, under->row, target_height_m),
+                    under->column, under->row);
     ++counts.targets;
     ++counts.traced_whole;
   }
@@ -1215,16 +1246,23 @@ SweepCounts sweep_viewshed(const GroundGrid& grid, const Position& eye, double t
 
 namespace {
 
-/// Least height over the sample under the eye.
-float height_under(const GroundGrid& grid, const Position& eye, const Under& under) {
-  const bool above = grid.at(under.column, under.row).z_m <= eye.z_m;
-  return above ? 0 : std::numeric_limits<float>::infinity();
+/// Least height over the sample under the eye, with a grid that blocks and one to stand on.
+float height_under(const GroundGrid& grid, const GroundGrid& stands, const Position& eye,
+                   const Under& under) {
+  const double blocks_m = grid.at(under.column, under.row).z_m;
+  const double ground_m = stands.at(under.column, under.row).z_m;
+  if (std::max(blocks_m, ground_m) > eye.z_m) return std::numeric_limits<float>::infinity();
+  if (blocks_m <= ground_m) return 0;
+  return std::nextafter(
+      static_cast<float>(stands.height_above_ground_m(under.column, under.row, blocks_m) +
+                         kLatticeStepM),
+      std::numeric_limits<float>::infinity());
 }
 
 }  // namespace
 
 SweepCounts sweep_heights(const GroundGrid& grid, const Position& eye, const SampleWindow& window,
-                          std::span<float> least_m) {
+                          std::span<float> least_m, const GroundGrid* stands) {
   assert(least_m.size() ==
          static_cast<std::size_t>(grid.columns()) * static_cast<std::size_t>(grid.rows()));
   if (window.last_column < window.first_column || window.last_row < window.first_row) return {};
@@ -1232,17 +1270,18 @@ SweepCounts sweep_heights(const GroundGrid& grid, const Position& eye, const Sam
   const SweepGround ground(grid, sight.frame(), 0, window);
   fill_window(grid, window, std::numeric_limits<float>::quiet_NaN(), least_m);
   SweepCounts counts = for_parts([&](const SweepPart& part) {
-    return PartSweep(sight, ground, 0, window).run_heights(part, least_m);
+    return PartSweep(sight, stands ? *stands : grid, ground, 0, window).run_heights(part, least_m);
   });
   if (const auto under = sample_under(sight, window)) {
-    least_m[index_in(grid, *under)] = height_under(grid, eye, *under);
+    least_m[index_in(grid, *under)] = height_under(grid, stands ? *stands : grid, eye, *under);
     ++counts.targets;
   }
   return counts;
 }
 
 SweepCounts lower_heights(const GroundGrid& grid, const Position& eye, const SampleWindow& window,
-                          const HeightLimit& limit, std::span<float> least_m) {
+                          const HeightLimit& limit, std::span<float> least_m,
+                          const GroundGrid* stands) {
   assert(least_m.size() ==
          static_cast<std::size_t>(grid.columns()) * static_cast<std::size_t>(grid.rows()));
   if (window.last_column < window.first_column || window.last_row < window.first_row) return {};
@@ -1250,11 +1289,12 @@ SweepCounts lower_heights(const GroundGrid& grid, const Position& eye, const Sam
   const SweepGround ground(grid, sight.frame(), 0, window);
   const LeastSoFar so_far{limit};
   SweepCounts counts = for_parts([&](const SweepPart& part) {
-    return PartSweep(sight, ground, 0, window).lower_heights(part, least_m, so_far);
+    return PartSweep(sight, stands ? *stands : grid, ground, 0, window)
+        .lower_heights(part, least_m, so_far);
   });
   if (const auto under = sample_under(sight, window)) {
     float& to = least_m[index_in(grid, *under)];
-    const float found_m = height_under(grid, eye, *under);
+    const float found_m = height_under(grid, stands ? *stands : grid, eye, *under);
     if (std::isfinite(found_m))
       to = std::fmin(to, limit ? limit(under->column, under->row, found_m) : found_m);
     ++counts.targets;

@@ -64,10 +64,12 @@ struct SweepCounts {
 class PartSweep {
  public:
   /// @param sight, ground    for the same grid, eye and target height, kept by reference
+  /// @param stands           what targets stand on: the grid, or another one of the same placement
+  ///                         and with the same known samples
   /// @param target_height_m  of targets above their samples
   /// @param window           samples outside are no targets, though they block
-  PartSweep(const GridSight& sight, const SweepGround& ground, double target_height_m,
-            const SampleWindow& window);
+  PartSweep(const GridSight& sight, const GroundGrid& stands, const SweepGround& ground,
+            double target_height_m, const SampleWindow& window);
 
   /// @param result[out]  [rows * columns]; the part's known samples in the window are written,
   /// others left
@@ -89,6 +91,7 @@ class PartSweep {
   class Run;
 
   const GridSight& sight_;
+  const GroundGrid& stands_;
   const SweepGround& ground_;
   double target_height_m_;
   SampleWindow window_;
@@ -97,7 +100,7 @@ class PartSweep {
 /// PartSweep::run_heights for all parts; NaN where a sample is void. 0 exactly where sweep_viewshed
 /// says kVisible of targets on the ground.
 SweepCounts sweep_heights(const GroundGrid& grid, const Position& eye, const SampleWindow& window,
-                          std::span<float> least_m);
+                          std::span<float> least_m, const GroundGrid* stands = nullptr);
 
 /// Lowers the heights so far of several eyes to those of one more, within limits.
 /// @param least_m[in, out]  [rows * columns] NaN where no eye has any; the lesser of what it is and
@@ -105,11 +108,14 @@ SweepCounts sweep_heights(const GroundGrid& grid, const Position& eye, const Sam
 /// Cost: with many eyes little more than sweep_viewshed, because most samples are seen lower
 /// already.
 SweepCounts lower_heights(const GroundGrid& grid, const Position& eye, const SampleWindow& window,
-                          const HeightLimit& limit, std::span<float> least_m);
+                          const HeightLimit& limit, std::span<float> least_m,
+                          const GroundGrid* stands = nullptr);
 
 /// All parts on all threads. The same bits for any number of threads.
 /// @param result[out]  [rows * columns]; the window is written, kUnknown where the sample is void
+/// @param stands       what targets stand on where that is not the grid that blocks; see PartSweep
 SweepCounts sweep_viewshed(const GroundGrid& grid, const Position& eye, double target_height_m,
-                           const SampleWindow& window, std::span<Seen> result);
+                           const SampleWindow& window, std::span<Seen> result,
+                           const GroundGrid* stands = nullptr);
 
 }  // namespace scarp

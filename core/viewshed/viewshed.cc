@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/threads/parallel_for.h"
+#include "core/viewshed/tin_viewshed.h"
 
 namespace scarp {
 namespace {
@@ -70,6 +71,15 @@ float climb_to_pitch(const GroundGrid& grid, const EyeBearings& bearings, const 
   return pitch_at(least_m) > limits.max_pitch_rad ? kNever : least_m;
 }
 
+SweepCounts all_judged(const SampleWindow& window) {
+  SweepCounts counts;
+  if (window.last_column < window.first_column || window.last_row < window.first_row) return counts;
+  counts.targets = counts.traced_whole =
+      static_cast<std::uint64_t>(window.last_column - window.first_column + 1) *
+      static_cast<std::uint64_t>(window.last_row - window.first_row + 1);
+  return counts;
+}
+
 /// The least height at a sample within an eye's limits, from that which the ground leaves.
 float within_limits(const GroundGrid& grid, const EyeBearings& bearings, const ViewLimits& limits,
                     std::int32_t column, std::int32_t row, float least_m) {
@@ -85,11 +95,19 @@ float within_limits(const GroundGrid& grid, const EyeBearings& bearings, const V
 
 }  // namespace
 
-SampleWindow heights_from(const GroundGrid& grid, const std::optional<EarthFrame>& earth,
+SampleWindow heights_from(const ViewGround& ground, const std::optional<EarthFrame>& earth,
                           const ViewshedEye& eye, std::span<float> least_m, SweepCounts* counts) {
+  const GroundGrid& grid = ground.stands;
   const EyeBearings bearings(eye.position, earth);
   const SampleWindow window = window_of(grid, eye, bearings);
-  const SweepCounts found = sweep_heights(grid, eye.position, window, least_m);
+  SweepCounts found;
+  if (ground.tin) {
+    tin_heights(*ground.tin, grid, eye.position, window, least_m);
+    found = all_judged(window);
+  } else {
+    found = sweep_heights(ground.obstacles ? *ground.obstacles : grid, eye.position, window,
+                          least_m, &grid);
+  }
   if (counts) *counts = found;
   for_rows(window, [&](std::int32_t row) {
     for (std::int32_t column = window.first_column; column <= window.last_column; ++column) {
@@ -103,16 +121,22 @@ SampleWindow heights_from(const GroundGrid& grid, const std::optional<EarthFrame
   return window;
 }
 
-void LeastHeight::lower(const GroundGrid& grid, const std::optional<EarthFrame>& earth,
+void LeastHeight::lower(const ViewGround& ground, const std::optional<EarthFrame>& earth,
                         const ViewshedEye& eye, SweepCounts* counts) {
+  const GroundGrid& grid = ground.stands;
+  if (ground.tin) {
+    std::vector<float> own_m(least_m_.size());
+    add(heights_from(ground, earth, eye, own_m, counts), own_m);
+    return;
+  }
   const EyeBearings bearings(eye.position, earth);
   HeightLimit limit;
   if (eye.limits.any())
     limit = [&](std::int32_t column, std::int32_t row, float least_m) {
       return within_limits(grid, bearings, eye.limits, column, row, least_m);
     };
-  const SweepCounts found =
-      lower_heights(grid, eye.position, window_of(grid, eye, bearings), limit, least_m_);
+  const SweepCounts found = lower_heights(ground.obstacles ? *ground.obstacles : grid, eye.position,
+                                          window_of(grid, eye, bearings), limit, least_m_, &grid);
   if (counts) *counts = found;
 }
 
@@ -130,11 +154,19 @@ void LeastHeight::add(const SampleWindow& window, std::span<const float> least_m
   });
 }
 
-SampleWindow view_from(const GroundGrid& grid, const std::optional<EarthFrame>& earth,
+SampleWindow view_from(const ViewGround& ground, const std::optional<EarthFrame>& earth,
                        const ViewshedEye& eye, std::span<Seen> sight, SweepCounts* counts) {
+  const GroundGrid& grid = ground.stands;
   const EyeBearings bearings(eye.position, earth);
   const SampleWindow window = window_of(grid, eye, bearings);
-  const SweepCounts found = sweep_viewshed(grid, eye.position, eye.target_height_m, window, sight);
+  SweepCounts found;
+  if (ground.tin) {
+    tin_viewshed(*ground.tin, grid, eye.position, eye.target_height_m, window, sight);
+    found = all_judged(window);
+  } else {
+    found = sweep_viewshed(ground.obstacles ? *ground.obstacles : grid, eye.position,
+                           eye.target_height_m, window, sight, &grid);
+  }
   if (counts) *counts = found;
   if (eye.limits.any()) keep_within(grid, bearings, eye, window, sight);
   return window;
