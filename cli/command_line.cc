@@ -153,6 +153,22 @@ void add_viewshed(CLI::App& app, ViewshedOptions& o, std::function<int()>& run) 
                                               {"count", ViewshedMode::kCount},
                                               {"ground", ViewshedMode::kGround},
                                               {"dem", ViewshedMode::kDem}}));
+  c->add_option("--obstacles", o.obstacles,
+                "A surface model over the DEM's cells (trees, buildings) that blocks; what is seen "
+                "is the DEM under it");
+  c->add_option("--polygons", o.polygons,
+                "A GeoPackage for the outlines of what is seen besides; in --mode count of what "
+                "each number of eyes sees");
+  c->add_flag("--total", o.total,
+              "Instead of eyes: how much ground every sample sees, square kilometres");
+  c->add_option("--eye-height", o.eye_height_m,
+                "Metres above ground of the eyes of --total; 2 unless given")
+      ->check(CLI::Range(0.0, 100'000.0));
+  c->add_option("--samples", o.samples,
+                "Samples of the ground that --total looks for, drawn at random; 1000 unless given, "
+                "all and so exact where there are no more")
+      ->check(CLI::PositiveNumber);
+  c->add_option("--seed", o.seed, "Of the draw of --samples");
   c->add_flag("--gdal-values", o.gdal_values, "Write 255 for visible, as gdal_viewshed does");
   add_surface(*c, o.dem);
   add_common(*c, o.common);

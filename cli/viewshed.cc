@@ -17,7 +17,9 @@
 #include "core/error/error.h"
 #include "core/memory/large_array.h"
 #include "core/threads/parallel_for.h"
+#include "core/viewshed/seen_ground.h"
 #include "ingest/observers/observers.h"
+#include "tiles/layers/geopackage.h"
 #include "tiles/layers/geotiff.h"
 
 namespace scarp {
@@ -95,10 +97,31 @@ const char* name_of(ViewshedMode mode) {
   }
 }
 
+/// What asks for a single eye has no place in a run for all.
+void check_total(const ViewshedOptions& options) {
+  const char* single = !options.observers.empty()               ? "--observer"
+                       : !options.observers_file.empty()        ? "--observers"
+                       : !options.each_folder.empty()           ? "--each"
+                       : options.azimuth_deg                    ? "--azimuth"
+                       : options.pitch_deg                      ? "--pitch"
+                       : !options.polygons.empty()              ? "--polygons"
+                       : options.gdal_values                    ? "--gdal-values"
+                       : options.mode != ViewshedMode::kVisible ? "--mode"
+                                                                : nullptr;
+  if (single)
+    throw Error(ErrorCode::kUsage,
+                fmt::format("{} does not go with --total, which looks from every sample all "
+                            "around; leave one of them out",
+                            single));
+}
+
 /// Wrong use shows before any work.
 void check_options(const ViewshedOptions& options) {
-  if (options.observers.empty() && options.observers_file.empty())
+  if (options.total) {
+    check_total(options);
+  } else if (options.observers.empty() && options.observers_file.empty()) {
     throw Error(ErrorCode::kUsage, "no eye: --observer X,Y[,H] or --observers FILE was expected");
+  }
   if (options.max_distance_m && options.min_distance_m > *options.max_distance_m)
     throw Error(ErrorCode::kUsage,
                 fmt::format("--min-distance {} is greater than --max-distance {}; nothing lies "
@@ -110,10 +133,16 @@ void check_options(const ViewshedOptions& options) {
                             options.pitch_deg->second));
   if (options.gdal_values && options.mode != ViewshedMode::kVisible)
     throw Error(ErrorCode::kUsage, "--gdal-values is for --mode visible; leave one of them out");
-  if (!options.common.overwrite && std::filesystem::exists(options.output))
-    throw Error(ErrorCode::kInput,
-                fmt::format("'{}': exists; a new file was expected; give --overwrite to replace it",
-                            options.output));
+  if (!options.polygons.empty() &&
+      (options.mode == ViewshedMode::kGround || options.mode == ViewshedMode::kDem))
+    throw Error(ErrorCode::kUsage,
+                "--polygons is for --mode visible and count; leave one of them out");
+  for (const std::string& file : {options.output, options.polygons})
+    if (!file.empty() && !options.common.overwrite && std::filesystem::exists(file))
+      throw Error(ErrorCode::kInput,
+                  fmt::format("'{}': exists; a new file was expected; give --overwrite to replace "
+                              "it",
+                              file));
   if (!options.each_folder.empty() && !std::filesystem::is_directory(options.each_folder))
     throw Error(ErrorCode::kInput,
                 fmt::format("'{}': is no folder; one for the rasters of --each was expected; make "
@@ -130,7 +159,12 @@ class ViewshedRun {
   int run() {
     check_options(options_);
     stages_.run("read", [&](const Progress& progress) { read(progress); });
-    stages_.run("see", [&](const Progress& progress) { see(progress); });
+    stages_.run("see", [&](const Progress& progress) {
+      if (options_.total)
+        see_back(progress);
+      else
+        see(progress);
+    });
     stages_.run("write", [&](const Progress&) { write(); });
     stages_.finish();
     print();
@@ -179,6 +213,58 @@ class ViewshedRun {
     }
   }
 
+  /// Looks from samples of the ground back at all places: sight is symmetric.
+  void see_back(const Progress& progress) {
+    const GroundGrid& grid = source_->samples();
+    const auto earth = source_->dem().frame->earth_frame();
+    std::uint64_t known = 0;
+    for (std::int32_t row = 0; row < grid.rows(); ++row)
+      for (std::int32_t column = 0; column < grid.columns(); ++column)
+        known += grid.is_known(column, row) ? 1 : 0;
+    if (known == 0)
+      throw Error(ErrorCode::kInput, fmt::format("'{}': no sample is known; ground was expected; "
+                                                 "check --nodata and --obstacles",
+                                                 options_.sources.front()));
+    const std::vector<SamplePlace> places = choose_samples(grid, options_.samples, options_.seed);
+    looks_ = places.size();
+    looks_share_ = static_cast<double>(looks_) / static_cast<double>(known);
+    sight_ = LargeArray<Seen>(static_cast<std::size_t>(grid.columns()) *
+                              static_cast<std::size_t>(grid.rows()));
+    SeenGround seen(grid);
+    const ViewLimits limits = limits_of(options_.min_distance_m, options_.max_distance_m, {}, {});
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      const Position ground =
+          grid.raised(places[i].column, places[i].row, options_.target_height_m);
+      SweepCounts counts;
+      const SampleWindow window =
+          view_from(source_->ground(), earth, {ground, options_.eye_height_m, limits},
+                    sight_.span(), &counts);
+      seen.add(window, sight_.span(), cell_area_m2(grid, earth, places[i]));
+      decided_.add(counts);
+      if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(places.size()));
+    }
+    areas_km2_ = seen.areas_km2(looks_share_);
+  }
+
+  void write_total() {
+    RasterLayer layer =
+        layer_over(source_->dem(), std::span<const float>(areas_km2_), "ground seen");
+    layer.unit = "km2";
+    layer.nodata = std::numeric_limits<double>::quiet_NaN();
+    layer.metadata["VALUES"] = "ground that is seen from here, square kilometres; NaN void";
+    layer.metadata["EYE_HEIGHT_M"] = fmt::format("{:g}", options_.eye_height_m);
+    layer.metadata["SAMPLES"] = std::to_string(looks_);
+    layer.metadata["ACCURACY"] =
+        looks_share_ == 1
+            ? "exact: every known sample was looked for"
+            : fmt::format(
+                  "estimated from {} of {:.0f} known samples drawn at random with seed {}; "
+                  "standard error at most {:.3g} % of all known ground",
+                  looks_, std::round(static_cast<double>(looks_) / looks_share_), options_.seed,
+                  50 / std::sqrt(static_cast<double>(looks_)));
+    write_layer(options_.output, layer, 0, 0);
+  }
+
   void see_from(const RunEye& from) {
     const auto earth = source_->dem().frame->earth_frame();
     const ViewshedEye eye{from.at.position, from.target_height_m, from.limits};
@@ -221,7 +307,9 @@ class ViewshedRun {
   std::span<const Seen> seen() const { return any_ ? any_->seen() : sight_.span(); }
 
   void write() {
-    if (least_) {
+    if (options_.total) {
+      write_total();
+    } else if (least_) {
       write_heights(options_.output, least_->heights_m(), 0, eyes_.size());
     } else if (count_) {
       RasterLayer layer = layer_over(source_->dem(), count_->counts(), "eyes that see it");
@@ -231,6 +319,23 @@ class ViewshedRun {
     } else {
       write_values(options_.output, seen(), 0, eyes_.size());
     }
+    if (!options_.polygons.empty()) write_polygons();
+  }
+
+  void write_polygons() const {
+    RasterLayer layer;
+    if (count_) {
+      layer = layer_over(source_->dem(), count_->counts(), "eyes");
+      layer.nodata = EyeCount::kVoid;
+    } else {
+      const std::span<const Seen> sight = seen();
+      layer = layer_over(source_->dem(),
+                         std::span<const std::uint8_t>(
+                             reinterpret_cast<const std::uint8_t*>(sight.data()), sight.size()),
+                         "visible");
+      layer.nodata = static_cast<double>(Seen::kUnknown);
+    }
+    write_area_polygons(options_.polygons, layer, count_ ? "eyes" : "visible", existing());
   }
 
   void write_layer(const std::string& path, RasterLayer& layer, std::size_t first,
@@ -308,7 +413,7 @@ class ViewshedRun {
     for (std::size_t i = first; i < std::min(end, first + kMostNamed); ++i)
       observers += fmt::format("{}{:.10g},{:.10g},{:.3f}asl", i > first ? " " : "",
                                eyes_[i].at.map.x, eyes_[i].at.map.y, eyes_[i].at.map.height_m);
-    metadata["MODE"] = name_of(options_.mode);
+    metadata["MODE"] = options_.total ? "total" : name_of(options_.mode);
     metadata["SURFACE"] = source_->surface();
     metadata["EARTH"] = frame.earth == Earth::kFlat ? "flat" : "ellipsoid";
     metadata["REFRACTION"] = fmt::format("{:g}", frame.refraction);
@@ -316,8 +421,12 @@ class ViewshedRun {
                           : frame.geoid_file.empty()  ? "taken as ellipsoidal"
                                                       : "geoid added";
     metadata["HEIGHT_UNIT_OF_DEM"] = source_->dem().height_unit;
-    metadata["OBSERVERS"] = std::to_string(end - first);
-    metadata["OBSERVER"] = observers;
+    if (!options_.total) {
+      metadata["OBSERVERS"] = std::to_string(end - first);
+      metadata["OBSERVER"] = observers;
+    }
+    if (source_->has_obstacles())
+      metadata["OBSTACLES"] = std::filesystem::path(options_.obstacles.front()).filename().string();
     if (!options_.observers_file.empty())
       metadata["OBSERVERS_FILE"] =
           std::filesystem::path(options_.observers_file).filename().string();
@@ -341,7 +450,11 @@ class ViewshedRun {
                              {"columns", source_->samples().columns()},
                              {"rows", source_->samples().rows()},
                              {"observers", eyes_.size()}};
-    if (least_) {
+    if (!options_.polygons.empty()) result["polygons"] = options_.polygons;
+    if (options_.total) {
+      result["looks"] = looks_;
+      result["exact"] = looks_share_ == 1;
+    } else if (least_) {
       const auto heights_m = least_->heights_m();
       result["unknown_samples"] =
           std::count_if(heights_m.begin(), heights_m.end(), [](float h) { return std::isnan(h); });
@@ -379,7 +492,10 @@ class ViewshedRun {
       fmt::print("{}\n", result.dump(2));
       return;
     }
-    if (least_) {
+    if (options_.total) {
+      fmt::print("{}: ground seen from {} samples, {}\n", options_.output, areas_km2_.size(),
+                 looks_share_ == 1 ? "exact" : fmt::format("from {} looks", looks_));
+    } else if (least_) {
       fmt::print("{}: heights of {} samples, {} unknown or out of the limits\n", options_.output,
                  least_->heights_m().size(), result["unknown_samples"].get<std::size_t>());
     } else if (count_) {
@@ -401,6 +517,9 @@ class ViewshedRun {
   std::optional<AnyEye> any_;
   std::optional<EyeCount> count_;
   std::optional<LeastHeight> least_;
+  std::vector<float> areas_km2_;  // of --total
+  std::size_t looks_ = 0;
+  double looks_share_ = 1;  // of the known samples
   std::vector<float> eye_heights_m_;
   SampleWindow window_;  // of the eye last seen from
   std::vector<std::uint8_t> gdal_values_;
