@@ -150,6 +150,21 @@ void check_options(const ViewshedOptions& options) {
                             options.each_folder));
 }
 
+/// What a run takes for each sample beyond kBytesPerGroundSample (docs/viewshed.md, "Memory").
+double more_bytes_per_sample(const ViewshedOptions& options) {
+  double bytes = 0;
+  if (options.total) {
+    bytes = 9;
+  } else if (options.mode == ViewshedMode::kCount) {
+    bytes = 3;
+  } else if (options.mode != ViewshedMode::kVisible) {
+    bytes = options.each_folder.empty() ? 2 : 6;
+  }
+  if (!options.obstacles.empty()) bytes += 8;  // both models are read before they are joined
+  if (!options.polygons.empty()) bytes += 9;
+  return bytes;
+}
+
 /// One run from options to a finished raster, a member function a stage.
 class ViewshedRun {
  public:
@@ -175,6 +190,7 @@ class ViewshedRun {
   void read(const Progress& progress) {
     DemOptions dem = options_.dem;
     dem.memory_budget_bytes = options_.common.memory_budget_bytes;
+    dem.more_bytes_per_sample = more_bytes_per_sample(options_);
     source_.emplace(options_.sources, options_.obstacles, dem, progress);
     for (const TypedPosition& typed : options_.observers)
       eyes_.push_back({source_->place(typed, options_.crs), options_.target_height_m,

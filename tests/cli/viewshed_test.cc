@@ -220,6 +220,8 @@ TEST_F(ViewshedCommand, RefusesInOneLineAndLeavesNothing) {
   refused("--observer 500150,3999450,1000asl --crs EPSG:0", 1, "EPSG:0");
   refused("--total " + std::string(kEye), 2, "--observer does not go with --total");
   refused("--total --azimuth 1,2", 2, "--azimuth");
+  // 72 samples of 12 bytes, of 15 where eyes are counted.
+  refused(std::string(kEye) + " --mode count --memory 1000", 1, "--memory");
   refused(std::string(kEye) + " --mode dem --polygons " + folder_.path("a.gpkg"), 2, "--polygons");
   refused(std::string(kEye) + " --obstacles " + write_dem("other.tif", 11, 0), 1, "11 x 6 cells");
   EXPECT_EQ(view("--observer 500150,3999450,1000asl").exit_code, 0);
