@@ -170,6 +170,48 @@ INSTANTIATE_TEST_SUITE_P(All, RealDems, testing::ValuesIn(proved_dems()),
                            return name;
                          });
 
+/// Obstacles in a frame whose normals lean: a target under them stands beside their sample by what
+/// the normal leans over their height.
+TEST(ObstaclesOnTheEllipsoid, SweepEqualsJudge) {
+  SCARP_SHARED_OR_SKIP(dem, "projected/new_zealand_1km_nztm.tif");
+  const test::TempFolder folder;
+  const GroundGrid ground = read_ground({window_of(dem, folder)}, {}, {}).grid;
+  GroundGrid obstacles(ground.columns(), ground.rows(), ground.placement());
+  for (std::int32_t r = 0; r < ground.rows(); ++r)
+    for (std::int32_t c = 0; c < ground.columns(); ++c)
+      if (ground.is_known(c, r))
+        obstacles.set_z(c, r, ground.at(c, r).z_m + ((c * 7 + r * 3) % 11 < 3 ? 24 : 0));
+  const auto columns = static_cast<std::size_t>(ground.columns());
+  std::vector<Seen> seen(columns * static_cast<std::size_t>(ground.rows()));
+  std::vector<float> least_m(seen.size());
+  std::size_t aside = 0;
+  for (const Eye& at : eyes_of(ground)) {
+    for (const double eye_m : {30.0, 400.0}) {
+      const Position eye = ground.raised(at.column, at.row, eye_m);
+      const GridSight judge(obstacles, eye);
+      for (const double target_m : {0.0, 1.5}) {
+        sweep_viewshed(obstacles, eye, target_m, whole_window(ground), seen, &ground);
+        sweep_heights(obstacles, eye, whole_window(ground), least_m, &ground);
+        for (std::size_t i = 0; i < seen.size(); ++i) {
+          const auto c = static_cast<std::int32_t>(i % columns),
+                     r = static_cast<std::int32_t>(i / columns);
+          if (!ground.is_known(c, r)) continue;
+          EXPECT_EQ(seen[i], judge.judge(ground.raised(c, r, target_m), c, r))
+              << "column " << c << " row " << r << " target " << target_m;
+          aside += ground.at(c, r).x_m != obstacles.at(c, r).x_m;
+          if (target_m > 0) continue;
+          EXPECT_EQ(seen[i] == Seen::kVisible, least_m[i] == 0) << "column " << c << " row " << r;
+          if (std::isfinite(least_m[i])) {
+            EXPECT_EQ(judge.judge(ground.raised(c, r, least_m[i]), c, r), Seen::kVisible)
+                << "column " << c << " row " << r << " height " << least_m[i];
+          }
+        }
+      }
+    }
+  }
+  EXPECT_GT(aside, 0U);
+}
+
 /// Positions may differ from the exact ones by what ground_placement promises and by the lattice.
 TEST(GroundPlacement, LiesWithinAMillimetreOfTheExactPlace) {
   for (const char* name :
