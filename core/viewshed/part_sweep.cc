@@ -12,6 +12,7 @@
 #include "core/geodesy/predicates.h"
 #include "core/threads/parallel_for.h"
 #include "core/viewshed/bin_history.h"
+#include "core/viewshed/least_height.h"
 #include "core/viewshed/line_kernels.h"
 #include "core/viewshed/ray_climb.h"
 
@@ -25,10 +26,6 @@ constexpr double kNearCells = 1.5;
 /// s of a sample is a double rounded to float (2^-24 of itself), compared with another such one;
 /// 2^-20 leaves room for the arithmetic before.
 constexpr float kSlopeMargin = 0x1p-20F;
-
-/// GridSight::least_z_m rounds up by less than this, metres: nearer to the ground it is judged
-/// whether that is seen.
-constexpr double kNearGroundM = 1e-3;
 
 constexpr std::int32_t kFirstBins = 8;
 
@@ -201,6 +198,13 @@ class PartSweep::Run {
   Position stand(std::int32_t line, std::int32_t i) const {
     return over_columns_ ? stands_.at(line, i) : stands_.at(i, line);
   }
+  /// On a ground of its own a target may stand beside the sample that blocks, by what the normal
+  /// leans over the height between them; the bin is that of the sample.
+  bool stands_aside(std::int32_t line, std::int32_t i) const {
+    if (!apart_) return false;
+    const Position at = stand(line, i), over = position(line, i);
+    return at.x_m != over.x_m || at.y_m != over.y_m;
+  }
   bool raised() const { return target_height_m_ != 0 || apart_; }
   Seen judge(std::int32_t line, std::int32_t i) {
     ++counts_.traced_whole;
@@ -252,7 +256,6 @@ class PartSweep::Run {
   void offer(std::int32_t line, std::int32_t i, float height_m);
   void mark_top(std::int32_t line, const float* up);
   std::pair<double, double> place_of(const Line& line, std::int32_t k) const;
-  float height_up_to(double z_m, std::int32_t line, std::int32_t i) const;
   std::pair<std::int32_t, std::int32_t> own_range(const Line& line) const;
   void take_targets(const Line& line);
   Seen decide_seen(const Line& line, const Line* before, std::int32_t k, Decision decision);
@@ -789,29 +792,10 @@ void PartSweep::Run::decide(const Line& line, const Line* before) {
   }
 }
 
-/// Height above a sample, along its normal, of a flattened height, rounded up; 0 below ground.
-float PartSweep::Run::height_up_to(double z_m, std::int32_t line, std::int32_t i) const {
-  const std::int32_t column = over_columns_ ? line : i, row = over_columns_ ? i : line;
-  if (z_m >= kLatticeReachM) return std::numeric_limits<float>::infinity();
-  if (z_m <= stands_.at(column, row).z_m) return 0;
-  // A target is put on the lattice: one step up holds whichever way it is rounded.
-  const double height_m = stands_.height_above_ground_m(column, row, z_m) + kLatticeStepM;
-  const auto rounded = static_cast<float>(height_m);
-  return rounded < height_m ? std::nextafter(rounded, std::numeric_limits<float>::infinity())
-                            : rounded;
-}
-
 float PartSweep::Run::climb_all(std::int32_t line, std::int32_t i) {
   ++counts_.traced_whole;
-  bool over_void = false;
-  const Position at = stand(line, i);
-  const double z_m = over_columns_ ? sight_.least_z_m(at, line, i, over_void)
-                                   : sight_.least_z_m(at, i, line, over_void);
-  if (over_void) return std::numeric_limits<float>::quiet_NaN();
-  if (std::abs(z_m - at.z_m) > kNearGroundM) return height_up_to(z_m, line, i);
-  // So near to the ground, whether it is seen is a matter for exact arithmetic.
-  const Seen seen = over_columns_ ? sight_.judge(at, line, i) : sight_.judge(at, i, line);
-  return seen == Seen::kVisible ? 0 : height_up_to(std::max(z_m, at.z_m + kClimbErrorM), line, i);
+  return over_columns_ ? least_height_m(sight_, stands_, line, i)
+                       : least_height_m(sight_, stands_, i, line);
 }
 
 /// Keeps in mind which line reaches highest in each bin. Requires its bounds in high_.
@@ -898,7 +882,8 @@ float PartSweep::Run::climb_in_bin(const Line& line, std::int32_t k, std::size_t
   if (z_m < ground_m + kClimbErrorM &&
       !is_blocked_in_bin(line, k, bin, static_cast<float>((ground_m - eye_z_m) / forwards)))
     return 0;
-  return height_up_to(std::max(z_m, ground_m) + kClimbErrorM, line.number, i);
+  return height_up_to(stands_, std::max(z_m, ground_m) + kClimbErrorM,
+                      over_columns_ ? line.number : i, over_columns_ ? i : line.number);
 }
 
 /// Least height over a sample of a line; NaN where that is not known, or where it cannot be less
@@ -909,7 +894,7 @@ float PartSweep::Run::climb_to(const Line& line, const Line* before, std::int32_
   const std::int32_t i = line.first + k;
   const auto bin =
       static_cast<std::size_t>(std::clamp(line.t[n], 0.0F, static_cast<float>(bins_ - 1)));
-  if (!bounds_hold_) return climb_all(line.number, i);
+  if (!bounds_hold_ || stands_aside(line.number, i)) return climb_all(line.number, i);
   if (all_void_[bin]) return std::numeric_limits<float>::quiet_NaN();
   if (so_far_) {
     const float s = low_[bin] - kSlopeMargin * std::abs(low_[bin]);
@@ -920,8 +905,7 @@ float PartSweep::Run::climb_to(const Line& line, const Line* before, std::int32_
     return climb_all(line.number, i);
   float s = line.s[n];
   if (apart_) {
-    const Position at = stand(line.number, i), over = position(line.number, i);
-    if (at.x_m != over.x_m || at.y_m != over.y_m) return climb_all(line.number, i);
+    const Position at = stand(line.number, i);
     s = static_cast<float>((at.z_m - sight_.eye().z_m) / place_of(line, k).first);
   }
   if (s >= high_[bin] + kSlopeMargin * std::abs(s)) return 0;
@@ -1244,23 +1228,6 @@ SweepCounts sweep_viewshed(const GroundGrid& grid, const Position& eye, double t
   return counts;
 }
 
-namespace {
-
-/// Least height over the sample under the eye, with a grid that blocks and one to stand on.
-float height_under(const GroundGrid& grid, const GroundGrid& stands, const Position& eye,
-                   const Under& under) {
-  const double blocks_m = grid.at(under.column, under.row).z_m;
-  const double ground_m = stands.at(under.column, under.row).z_m;
-  if (std::max(blocks_m, ground_m) > eye.z_m) return std::numeric_limits<float>::infinity();
-  if (blocks_m <= ground_m) return 0;
-  return std::nextafter(
-      static_cast<float>(stands.height_above_ground_m(under.column, under.row, blocks_m) +
-                         kLatticeStepM),
-      std::numeric_limits<float>::infinity());
-}
-
-}  // namespace
-
 SweepCounts sweep_heights(const GroundGrid& grid, const Position& eye, const SampleWindow& window,
                           std::span<float> least_m, const GroundGrid* stands) {
   assert(least_m.size() ==
@@ -1273,7 +1240,8 @@ SweepCounts sweep_heights(const GroundGrid& grid, const Position& eye, const Sam
     return PartSweep(sight, stands ? *stands : grid, ground, 0, window).run_heights(part, least_m);
   });
   if (const auto under = sample_under(sight, window)) {
-    least_m[index_in(grid, *under)] = height_under(grid, stands ? *stands : grid, eye, *under);
+    least_m[index_in(grid, *under)] =
+        least_height_m(sight, stands ? *stands : grid, under->column, under->row);
     ++counts.targets;
   }
   return counts;
@@ -1294,7 +1262,7 @@ SweepCounts lower_heights(const GroundGrid& grid, const Position& eye, const Sam
   });
   if (const auto under = sample_under(sight, window)) {
     float& to = least_m[index_in(grid, *under)];
-    const float found_m = height_under(grid, stands ? *stands : grid, eye, *under);
+    const float found_m = least_height_m(sight, stands ? *stands : grid, under->column, under->row);
     if (std::isfinite(found_m))
       to = std::fmin(to, limit ? limit(under->column, under->row, found_m) : found_m);
     ++counts.targets;

@@ -77,8 +77,9 @@ class PartSweep {
 
   /// Instead: how high above each sample, along its normal, a target must be at least to be seen.
   /// @param least_m[out]  [rows * columns] metres, rounded up (by less than 1 mm and float's own
-  ///                      step); 0 where the ground is seen, NaN where the line is over void
-  ///                      ground, infinite above an eye under ground
+  ///                      step) for a target straight over the sample in the frame, from which a
+  ///                      normal leans aside a little; 0 where the ground is seen, NaN where the
+  ///                      line is over void ground, infinite above an eye under ground
   SweepCounts run_heights(const SweepPart& part, std::span<float> least_m);
 
   /// The same where only what is lower than the heights so far is of interest: nothing is compared

@@ -200,9 +200,13 @@ TEST(ObstaclesOnTheEllipsoid, SweepEqualsJudge) {
               << "column " << c << " row " << r << " target " << target_m;
           aside += ground.at(c, r).x_m != obstacles.at(c, r).x_m;
           if (target_m > 0) continue;
-          EXPECT_EQ(seen[i] == Seen::kVisible, least_m[i] == 0) << "column " << c << " row " << r;
+          EXPECT_EQ(seen[i] == Seen::kVisible, least_m[i] == 0)
+              << "column " << c << " row " << r << " least height " << least_m[i] << " eye over "
+              << at.column << "," << at.row << " at " << eye_m;
           if (std::isfinite(least_m[i])) {
-            EXPECT_EQ(judge.judge(ground.raised(c, r, least_m[i]), c, r), Seen::kVisible)
+            Position over = ground.at(c, r);
+            over.z_m = ground.raised(c, r, least_m[i]).z_m;
+            EXPECT_EQ(judge.judge(over, c, r), Seen::kVisible)
                 << "column " << c << " row " << r << " height " << least_m[i];
           }
         }
