@@ -123,7 +123,7 @@ TEST(Obstacles, LeastHeightsClearThem) {
 }
 
 TEST(TinViewshed, EqualsItsJudgeAtEverySample) {
-  const SampleGrid samples = test::random_hills(24, 20, 30, 5, 60, 0.5, 0.04);
+  const SampleGrid samples = test::random_hills(40, 34, 30, 5, 12, 1 / 256.0, 0.04);
   const Tin tin = test::triangulated(samples, 7);
   const TinIndex index(tin);
   GroundGrid grid(samples);
@@ -131,7 +131,7 @@ TEST(TinViewshed, EqualsItsJudgeAtEverySample) {
   std::vector<Seen> seen(samples.positions.size());
   std::vector<float> least_m(samples.positions.size());
   int hidden = 0, raised = 0;
-  for (const std::int32_t column : {3, 12, 20}) {
+  for (const std::int32_t column : {3, 12, 20, 35}) {
     Position eye = grid.at(column, 10);
     eye.z_m += 2;
     const ViewGround view = ViewGround::of_tin(grid, index);
