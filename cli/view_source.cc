@@ -15,6 +15,21 @@ namespace {
 /// This much of a cell may be rounding in the headers of two files over the same cells.
 constexpr double kSameCells = 0.01;
 
+/// Do two CRSs put the raster's corners at the same places?
+bool same_crs(const Dem& a, const std::string& a_wkt, const std::string& b_wkt) {
+  if (a_wkt.empty() || b_wkt.empty() || a_wkt == b_wkt) return a_wkt == b_wkt;
+  for (const double column : {0.0, a.columns - 1.0}) {
+    for (const double row : {0.0, a.rows - 1.0}) {
+      const MapPoint from{a.x_of(column), a.y_of(row), 0};
+      const MapPoint to = convert_coordinates(b_wkt, a_wkt, from);
+      if (std::abs(to.x - from.x) > kSameCells * a.geotransform[1] ||
+          std::abs(to.y - from.y) > kSameCells * -a.geotransform[5])
+        return false;
+    }
+  }
+  return true;
+}
+
 bool same_cells(const Dem& a, const Dem& b) {
   if (a.columns != b.columns || a.rows != b.rows) return false;
   const auto near = [&](std::size_t i, double cell) {
@@ -22,8 +37,7 @@ bool same_cells(const Dem& a, const Dem& b) {
   };
   const double width = a.geotransform[1], height = a.geotransform[5];
   return near(0, width) && near(3, height) && near(1, width / a.columns) &&
-         near(5, height / a.rows) &&
-         a.frame->description().crs_wkt.empty() == b.frame->description().crs_wkt.empty();
+         near(5, height / a.rows);
 }
 
 }  // namespace
@@ -68,6 +82,12 @@ void ViewSource::read_obstacles(const std::vector<std::string>& files, const Dem
                     files.front(), read.dem.columns, read.dem.rows, read.dem.geotransform[0],
                     read.dem.geotransform[3], ground_.dem.columns, ground_.dem.rows,
                     ground_.dem.geotransform[0], ground_.dem.geotransform[3]));
+  if (!same_crs(ground_.dem, ground_.dem.frame->description().crs_wkt,
+                read.dem.frame->description().crs_wkt))
+    throw Error(ErrorCode::kInput,
+                fmt::format("'{}': has another coordinate system than the terrain model; the same "
+                            "one was expected; warp it with gdalwarp -t_srs",
+                            files.front()));
   // Headers may differ by rounding; both grids have the placement of the terrain model.
   obstacles_.emplace(ground_.dem.columns, ground_.dem.rows, ground_.grid.placement());
   GroundGrid& samples = ground_.grid;

@@ -30,14 +30,15 @@ class ViewshedCommand : public testing::Test {
   }
 
   /// @param more_m  on the samples of the ninth column, a hedge
-  std::string write_dem(const std::string& name, int columns, float more_m) {
+  std::string write_dem(const std::string& name, int columns, float more_m,
+                        const char* crs_name = "EPSG:32611") {
     const std::string path = folder_.path(name);
     GDALDataset* dataset = GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
         path.c_str(), columns, kRows, 1, GDT_Float32, nullptr);
     double transform[6] = {500'000, 100, 0, 4'000'000, 0, -100};
     dataset->SetGeoTransform(transform);
     OGRSpatialReference crs;
-    crs.SetFromUserInput("EPSG:32611");
+    crs.SetFromUserInput(crs_name);
     dataset->SetSpatialRef(&crs);
     std::vector<float> heights(static_cast<std::size_t>(columns * kRows), 10);
     for (int r = 0; r < kRows; ++r) heights[static_cast<std::size_t>(r * columns + 5)] = 50;
@@ -224,6 +225,8 @@ TEST_F(ViewshedCommand, RefusesInOneLineAndLeavesNothing) {
   refused(std::string(kEye) + " --mode count --memory 1000", 1, "--memory");
   refused(std::string(kEye) + " --mode dem --polygons " + folder_.path("a.gpkg"), 2, "--polygons");
   refused(std::string(kEye) + " --obstacles " + write_dem("other.tif", 11, 0), 1, "11 x 6 cells");
+  refused(std::string(kEye) + " --obstacles " + write_dem("zone12.tif", kColumns, 0, "EPSG:32612"),
+          1, "another coordinate system");
   EXPECT_EQ(view("--observer 500150,3999450,1000asl").exit_code, 0);
   EXPECT_EQ(view(kEye).exit_code, 1);
   EXPECT_EQ(view(std::string(kEye) + " --overwrite").exit_code, 0);
