@@ -197,8 +197,7 @@ class Build {
     add_layer("layers/groups.tif", "cog",
               [&](const std::string& path) { write_geotiff_cog(path, groups, Existing::kRefuse); });
 
-    const std::vector<std::uint8_t> seen =
-        viewshed_of_samples(grid_, triangles, *index_, eye_, progress);
+    const std::vector<std::uint8_t> seen = viewshed_of_samples(dem_, *index_, eye_, progress);
     RasterLayer viewshed = layer_over(dem_, std::span(seen), "visible");
     viewshed.nodata = kUnknownValue;
     viewshed.colours = {{{70, 80, 96, 255}, {250, 196, 60, 255}}};

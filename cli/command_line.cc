@@ -131,13 +131,19 @@ void add_build(CLI::App& app, BuildOptions& o, std::function<int()>& run) {
   c->callback([&] { run = [&o] { return run_build(o); }; });
 }
 
+void add_sources(CLI::App& command, std::vector<std::string>& sources) {
+  command.add_option("source", sources, "A scene, or any rasters of heights that GDAL reads")
+      ->required();
+}
+
 void add_viewshed(CLI::App& app, ViewshedOptions& o, std::function<int()>& run) {
-  CLI::App* c = app.add_subcommand("viewshed", "What one eye or several see of a DEM, exactly");
+  CLI::App* c =
+      app.add_subcommand("viewshed", "What one eye or several see of a DEM or a scene, exactly");
   c->footer(
       "Example:\n  scarp viewshed alps.tif --observer 8.65,46.55,2 --crs OGC:CRS84 -o seen.tif\n"
       "1 visible, 0 hidden, 255 unknown (void). On the ellipsoid wherever the DEM has a CRS, in\n"
       "degrees too. Several DEMs that share their cells make one mosaic.");
-  c->add_option("dem", o.dem_files, "Any rasters that GDAL reads")->required();
+  add_sources(*c, o.sources);
   c->add_option("-o,--output", o.output, "The raster of the answer, a cloud-optimised GeoTIFF")
       ->required();
   c->add_option_function<std::vector<std::string>>(
@@ -177,15 +183,26 @@ void add_viewshed(CLI::App& app, ViewshedOptions& o, std::function<int()>& run) 
                                               {"count", ViewshedMode::kCount},
                                               {"ground", ViewshedMode::kGround},
                                               {"dem", ViewshedMode::kDem}}));
+  c->add_option("--obstacles", o.obstacles,
+                "A surface model over the DEM's cells (trees, buildings) that blocks; what is seen "
+                "is the DEM under it");
+  c->add_option("--polygons", o.polygons,
+                "A GeoPackage for the outlines of what is seen besides; in --mode count of what "
+                "each number of eyes sees");
+  c->add_flag("--total", o.total,
+              "Instead of eyes: how much ground every sample sees, square kilometres");
+  c->add_option("--eye-height", o.eye_height_m,
+                "Metres above ground of the eyes of --total; 2 unless given")
+      ->check(CLI::Range(0.0, 100'000.0));
+  c->add_option("--samples", o.samples,
+                "Samples of the ground that --total looks for, drawn at random; 1000 unless given, "
+                "all and so exact where there are no more")
+      ->check(CLI::PositiveNumber);
+  c->add_option("--seed", o.seed, "Of the draw of --samples");
   c->add_flag("--gdal-values", o.gdal_values, "Write 255 for visible, as gdal_viewshed does");
   add_surface(*c, o.dem);
   add_common(*c, o.common);
   c->callback([&] { run = [&o] { return run_viewshed(o); }; });
-}
-
-void add_sources(CLI::App& command, std::vector<std::string>& sources) {
-  command.add_option("source", sources, "A scene, or any rasters of heights that GDAL reads")
-      ->required();
 }
 
 void add_sight(CLI::App& app, SightOptions& o, std::function<int()>& run) {

@@ -10,6 +10,23 @@
 #include "tiles/store/tin_file.h"
 
 namespace scarp {
+
+const std::string* scene_among(const std::vector<std::string>& sources, const DemOptions& options) {
+  const auto scene = std::find_if(sources.begin(), sources.end(), is_scene);
+  if (scene == sources.end()) return nullptr;
+  if (sources.size() > 1)
+    throw Error(ErrorCode::kUsage,
+                fmt::format("'{}': is a scene; it was expected alone, or DEM files", *scene));
+  if (options.earth || options.refraction != 0 || !options.geoid_file.empty() ||
+      options.height_unit || options.nodata)
+    throw Error(ErrorCode::kUsage,
+                fmt::format("'{}': is a scene, which has its earth, refraction, geoid, unit and "
+                            "void; leave --earth, --refraction, --geoid, --height-unit and "
+                            "--nodata out, or build it again with them",
+                            *scene));
+  return &*scene;
+}
+
 FrameDescription frame_of(const SceneDescription& description) {
   FrameDescription frame;
   frame.crs_wkt = description.crs_wkt;

@@ -27,6 +27,10 @@ struct LoadedScene {
   TinIndex index;
 };
 
+/// The scene among the sources of a command, or nothing where all are DEMs.
+/// Throws Error{kUsage} where a scene is not alone, or options for reading a DEM are given with it.
+const std::string* scene_among(const std::vector<std::string>& sources, const DemOptions& options);
+
 /// The frame that a scene was built in.
 FrameDescription frame_of(const SceneDescription& description);
 

@@ -82,8 +82,10 @@ enum class ViewshedMode { kVisible, kCount, kGround, kDem };
 struct ViewshedOptions {
   CommonOptions common;
   DemOptions dem;
-  std::vector<std::string> dem_files;
+  std::vector<std::string> sources;    ///< a scene, or DEM files
+  std::vector<std::string> obstacles;  ///< a surface model that blocks instead; may be empty
   std::string output;
+  std::string polygons;  ///< a GeoPackage of what is seen; empty: none
   std::vector<TypedPosition> observers;
   std::string observers_file;
   std::string each_folder;  ///< a raster for each eye goes here
@@ -95,6 +97,10 @@ struct ViewshedOptions {
   std::optional<std::pair<double, double>> azimuth_deg;  ///< from, to, clockwise from north
   std::optional<std::pair<double, double>> pitch_deg;    ///< lowest, highest
   bool gdal_values = false;                              ///< 255 visible, 0 hidden
+  bool total = false;            ///< how much ground each sample sees, instead of eyes
+  double eye_height_m = 2;       ///< of all eyes of --total, above ground
+  std::uint64_t samples = 1000;  ///< of the ground, that --total looks for
+  std::uint64_t seed = 1;        ///< that chooses them
 };
 
 struct SightOptions {

@@ -104,19 +104,8 @@ class TinSurface : public SightSurface {
 
 std::unique_ptr<SightSurface> open_surface(const std::vector<std::string>& sources,
                                            const DemOptions& options, const Progress& progress) {
-  const auto scene = std::find_if(sources.begin(), sources.end(), is_scene);
-  if (scene == sources.end())
-    return std::make_unique<GridSurface>(read_ground(sources, options, progress));
-  if (sources.size() > 1)
-    throw Error(ErrorCode::kUsage,
-                fmt::format("'{}': is a scene; it was expected alone, or DEM files", *scene));
-  if (options.earth || options.refraction != 0 || !options.geoid_file.empty() ||
-      options.height_unit || options.nodata)
-    throw Error(ErrorCode::kUsage,
-                fmt::format("'{}': is a scene, which has its earth, refraction, geoid, unit and "
-                            "void; leave --earth, --refraction, --geoid, --height-unit and "
-                            "--nodata out, or build it again with them",
-                            *scene));
+  const std::string* scene = scene_among(sources, options);
+  if (!scene) return std::make_unique<GridSurface>(read_ground(sources, options, progress));
   return std::make_unique<TinSurface>(*scene);
 }
 

@@ -12,12 +12,14 @@
 
 #include "cli/build/layers.h"
 #include "cli/commands.h"
-#include "cli/ground_eye.h"
 #include "cli/stages.h"
+#include "cli/view_source.h"
 #include "core/error/error.h"
 #include "core/memory/large_array.h"
 #include "core/threads/parallel_for.h"
+#include "core/viewshed/seen_ground.h"
 #include "ingest/observers/observers.h"
+#include "tiles/layers/geopackage.h"
 #include "tiles/layers/geotiff.h"
 
 namespace scarp {
@@ -58,14 +60,14 @@ ViewLimits limits_of(double min_distance_m, std::optional<double> max_distance_m
 }
 
 /// An eye from a file; the options hold for what it leaves out.
-RunEye eye_of(const ObserverRecord& record, const ViewshedOptions& options, const Ground& ground) {
+RunEye eye_of(const ObserverRecord& record, const ViewshedOptions& options,
+              const ViewSource& source) {
   RunEye eye;
   const double height_m = record.height_m.value_or(TypedPosition().height_m);
-  eye.at = place_eye({record.x, record.y, record.elevation_m.value_or(height_m)},
-                     record.elevation_m.has_value(),
-                     fmt::format("{}{}{:.10g},{:.10g}", record.name, record.name.empty() ? "" : " ",
-                                 record.x, record.y),
-                     ground);
+  eye.at = source.place({record.x, record.y, record.elevation_m.value_or(height_m)},
+                        record.elevation_m.has_value(),
+                        fmt::format("{}{}{:.10g},{:.10g}", record.name,
+                                    record.name.empty() ? "" : " ", record.x, record.y));
   eye.target_height_m = record.target_height_m.value_or(options.target_height_m);
   Range azimuth_deg = options.azimuth_deg, pitch_deg = options.pitch_deg;
   if (record.azimuth_from_deg)
@@ -95,10 +97,31 @@ const char* name_of(ViewshedMode mode) {
   }
 }
 
+/// What asks for a single eye has no place in a run for all.
+void check_total(const ViewshedOptions& options) {
+  const char* single = !options.observers.empty()               ? "--observer"
+                       : !options.observers_file.empty()        ? "--observers"
+                       : !options.each_folder.empty()           ? "--each"
+                       : options.azimuth_deg                    ? "--azimuth"
+                       : options.pitch_deg                      ? "--pitch"
+                       : !options.polygons.empty()              ? "--polygons"
+                       : options.gdal_values                    ? "--gdal-values"
+                       : options.mode != ViewshedMode::kVisible ? "--mode"
+                                                                : nullptr;
+  if (single)
+    throw Error(ErrorCode::kUsage,
+                fmt::format("{} does not go with --total, which looks from every sample all "
+                            "around; leave one of them out",
+                            single));
+}
+
 /// Wrong use shows before any work.
 void check_options(const ViewshedOptions& options) {
-  if (options.observers.empty() && options.observers_file.empty())
+  if (options.total) {
+    check_total(options);
+  } else if (options.observers.empty() && options.observers_file.empty()) {
     throw Error(ErrorCode::kUsage, "no eye: --observer X,Y[,H] or --observers FILE was expected");
+  }
   if (options.max_distance_m && options.min_distance_m > *options.max_distance_m)
     throw Error(ErrorCode::kUsage,
                 fmt::format("--min-distance {} is greater than --max-distance {}; nothing lies "
@@ -110,15 +133,36 @@ void check_options(const ViewshedOptions& options) {
                             options.pitch_deg->second));
   if (options.gdal_values && options.mode != ViewshedMode::kVisible)
     throw Error(ErrorCode::kUsage, "--gdal-values is for --mode visible; leave one of them out");
-  if (!options.common.overwrite && std::filesystem::exists(options.output))
-    throw Error(ErrorCode::kInput,
-                fmt::format("'{}': exists; a new file was expected; give --overwrite to replace it",
-                            options.output));
+  if (!options.polygons.empty() &&
+      (options.mode == ViewshedMode::kGround || options.mode == ViewshedMode::kDem))
+    throw Error(ErrorCode::kUsage,
+                "--polygons is for --mode visible and count; leave one of them out");
+  for (const std::string& file : {options.output, options.polygons})
+    if (!file.empty() && !options.common.overwrite && std::filesystem::exists(file))
+      throw Error(ErrorCode::kInput,
+                  fmt::format("'{}': exists; a new file was expected; give --overwrite to replace "
+                              "it",
+                              file));
   if (!options.each_folder.empty() && !std::filesystem::is_directory(options.each_folder))
     throw Error(ErrorCode::kInput,
                 fmt::format("'{}': is no folder; one for the rasters of --each was expected; make "
                             "it first",
                             options.each_folder));
+}
+
+/// What a run takes for each sample beyond kBytesPerGroundSample (docs/viewshed.md, "Memory").
+double more_bytes_per_sample(const ViewshedOptions& options) {
+  double bytes = 0;
+  if (options.total) {
+    bytes = 9;
+  } else if (options.mode == ViewshedMode::kCount) {
+    bytes = 3;
+  } else if (options.mode != ViewshedMode::kVisible) {
+    bytes = options.each_folder.empty() ? 2 : 6;
+  }
+  if (!options.obstacles.empty()) bytes += 8;  // both models are read before they are joined
+  if (!options.polygons.empty()) bytes += 9;
+  return bytes;
 }
 
 /// One run from options to a finished raster, a member function a stage.
@@ -130,7 +174,12 @@ class ViewshedRun {
   int run() {
     check_options(options_);
     stages_.run("read", [&](const Progress& progress) { read(progress); });
-    stages_.run("see", [&](const Progress& progress) { see(progress); });
+    stages_.run("see", [&](const Progress& progress) {
+      if (options_.total)
+        see_back(progress);
+      else
+        see(progress);
+    });
     stages_.run("write", [&](const Progress&) { write(); });
     stages_.finish();
     print();
@@ -141,16 +190,17 @@ class ViewshedRun {
   void read(const Progress& progress) {
     DemOptions dem = options_.dem;
     dem.memory_budget_bytes = options_.common.memory_budget_bytes;
-    ground_ = read_ground(options_.dem_files, dem, progress);
+    dem.more_bytes_per_sample = more_bytes_per_sample(options_);
+    source_.emplace(options_.sources, options_.obstacles, dem, progress);
     for (const TypedPosition& typed : options_.observers)
-      eyes_.push_back({place_eye(typed, options_.crs, ground_), options_.target_height_m,
+      eyes_.push_back({source_->place(typed, options_.crs), options_.target_height_m,
                        limits_of(options_.min_distance_m, options_.max_distance_m,
                                  options_.azimuth_deg, options_.pitch_deg),
                        ""});
     if (options_.observers_file.empty()) return;
-    const std::string& wkt = ground_.dem.frame->description().crs_wkt;
+    const std::string& wkt = source_->dem().frame->description().crs_wkt;
     for (const ObserverRecord& record : read_observers(options_.observers_file, wkt, options_.crs))
-      eyes_.push_back(eye_of(record, options_, ground_));
+      eyes_.push_back(eye_of(record, options_, *source_));
   }
 
   bool measures_heights() const {
@@ -158,12 +208,12 @@ class ViewshedRun {
   }
 
   void see(const Progress& progress) {
-    const GroundGrid& grid = ground_.grid;
+    const GroundGrid& grid = source_->samples();
     const std::size_t samples =
         static_cast<std::size_t>(grid.columns()) * static_cast<std::size_t>(grid.rows());
     if (measures_heights()) {
       least_.emplace(grid);
-      eye_heights_m_.resize(samples);
+      if (!options_.each_folder.empty()) eye_heights_m_.resize(samples);
     } else {
       sight_ = LargeArray<Seen>(samples);
     }
@@ -179,15 +229,69 @@ class ViewshedRun {
     }
   }
 
+  /// Looks from samples of the ground back at all places: sight is symmetric.
+  void see_back(const Progress& progress) {
+    const GroundGrid& grid = source_->samples();
+    const auto earth = source_->dem().frame->earth_frame();
+    std::uint64_t known = 0;
+    for (std::int32_t row = 0; row < grid.rows(); ++row)
+      for (std::int32_t column = 0; column < grid.columns(); ++column)
+        known += grid.is_known(column, row) ? 1 : 0;
+    if (known == 0)
+      throw Error(ErrorCode::kInput, fmt::format("'{}': no sample is known; ground was expected; "
+                                                 "check --nodata and --obstacles",
+                                                 options_.sources.front()));
+    const std::vector<SamplePlace> places = choose_samples(grid, options_.samples, options_.seed);
+    looks_ = places.size();
+    looks_share_ = static_cast<double>(looks_) / static_cast<double>(known);
+    sight_ = LargeArray<Seen>(static_cast<std::size_t>(grid.columns()) *
+                              static_cast<std::size_t>(grid.rows()));
+    SeenGround seen(grid);
+    const ViewLimits limits = limits_of(options_.min_distance_m, options_.max_distance_m, {}, {});
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      const Position ground =
+          grid.raised(places[i].column, places[i].row, options_.target_height_m);
+      SweepCounts counts;
+      const SampleWindow window =
+          view_from(source_->ground(), earth, {ground, options_.eye_height_m, limits},
+                    sight_.span(), &counts);
+      seen.add(window, sight_.span(), cell_area_m2(grid, earth, places[i]));
+      decided_.add(counts);
+      if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(places.size()));
+    }
+    areas_km2_ = seen.areas_km2(looks_share_);
+  }
+
+  void write_total() {
+    RasterLayer layer =
+        layer_over(source_->dem(), std::span<const float>(areas_km2_), "ground seen");
+    layer.unit = "km2";
+    layer.nodata = std::numeric_limits<double>::quiet_NaN();
+    layer.metadata["VALUES"] = "ground that is seen from here, square kilometres; NaN void";
+    layer.metadata["EYE_HEIGHT_M"] = fmt::format("{:g}", options_.eye_height_m);
+    layer.metadata["SAMPLES"] = std::to_string(looks_);
+    layer.metadata["ACCURACY"] =
+        looks_share_ == 1
+            ? "exact: every known sample was looked for"
+            : fmt::format(
+                  "estimated from {} of {:.0f} known samples drawn at random with seed {}; "
+                  "standard error at most {:.3g} % of all known ground",
+                  looks_, std::round(static_cast<double>(looks_) / looks_share_), options_.seed,
+                  50 / std::sqrt(static_cast<double>(looks_)));
+    write_layer(options_.output, layer, 0, 0);
+  }
+
   void see_from(const RunEye& from) {
-    const auto earth = ground_.dem.frame->earth_frame();
+    const auto earth = source_->dem().frame->earth_frame();
     const ViewshedEye eye{from.at.position, from.target_height_m, from.limits};
     SweepCounts counts;
-    if (least_) {
-      window_ = heights_from(ground_.grid, earth, eye, eye_heights_m_, &counts);
+    if (least_ && options_.each_folder.empty()) {
+      least_->lower(source_->ground(), earth, eye, &counts);
+    } else if (least_) {
+      window_ = heights_from(source_->ground(), earth, eye, eye_heights_m_, &counts);
       least_->add(window_, eye_heights_m_);
     } else {
-      window_ = view_from(ground_.grid, earth, eye, sight_.span(), &counts);
+      window_ = view_from(source_->ground(), earth, eye, sight_.span(), &counts);
       if (count_) count_->add(window_, sight_.span());
       if (any_) any_->add(window_, sight_.span());
     }
@@ -206,11 +310,11 @@ class ViewshedRun {
     if (name.empty() || name.front() == '.') name = fmt::format("{:04}", i + 1);
     const std::string path = fmt::format("{}/{}.tif", options_.each_folder, name);
     if (least_) {
-      LeastHeight alone(ground_.grid);
+      LeastHeight alone(source_->samples());
       alone.add(window_, eye_heights_m_);
       write_heights(path, alone.heights_m(), i, i + 1);
     } else {
-      AnyEye alone(ground_.grid);
+      AnyEye alone(source_->samples());
       alone.add(window_, sight_.span());
       write_values(path, alone.seen(), i, i + 1);
     }
@@ -219,16 +323,35 @@ class ViewshedRun {
   std::span<const Seen> seen() const { return any_ ? any_->seen() : sight_.span(); }
 
   void write() {
-    if (least_) {
+    if (options_.total) {
+      write_total();
+    } else if (least_) {
       write_heights(options_.output, least_->heights_m(), 0, eyes_.size());
     } else if (count_) {
-      RasterLayer layer = layer_over(ground_.dem, count_->counts(), "eyes that see it");
+      RasterLayer layer = layer_over(source_->dem(), count_->counts(), "eyes that see it");
       layer.nodata = EyeCount::kVoid;
       layer.metadata["VALUES"] = "number of eyes that see it; 4294967295 void";
       write_layer(options_.output, layer, 0, eyes_.size());
     } else {
       write_values(options_.output, seen(), 0, eyes_.size());
     }
+    if (!options_.polygons.empty()) write_polygons();
+  }
+
+  void write_polygons() const {
+    RasterLayer layer;
+    if (count_) {
+      layer = layer_over(source_->dem(), count_->counts(), "eyes");
+      layer.nodata = EyeCount::kVoid;
+    } else {
+      const std::span<const Seen> sight = seen();
+      layer = layer_over(source_->dem(),
+                         std::span<const std::uint8_t>(
+                             reinterpret_cast<const std::uint8_t*>(sight.data()), sight.size()),
+                         "visible");
+      layer.nodata = static_cast<double>(Seen::kUnknown);
+    }
+    write_area_polygons(options_.polygons, layer, count_ ? "eyes" : "visible", existing());
   }
 
   void write_layer(const std::string& path, RasterLayer& layer, std::size_t first,
@@ -248,10 +371,10 @@ class ViewshedRun {
       std::transform(sight.begin(), sight.end(), gdal_values_.begin(), [](Seen s) {
         return static_cast<std::uint8_t>(s == Seen::kVisible ? 255 : 0);
       });
-      layer = layer_over(ground_.dem, std::span<const std::uint8_t>(gdal_values_), "visible");
+      layer = layer_over(source_->dem(), std::span<const std::uint8_t>(gdal_values_), "visible");
       layer.metadata["VALUES"] = "255 visible, 0 hidden or unknown";
     } else {
-      layer = layer_over(ground_.dem, bytes, "visible");
+      layer = layer_over(source_->dem(), bytes, "visible");
       layer.nodata = 255;
       layer.colours = {{{70, 80, 96, 255}, {250, 196, 60, 255}}};
       layer.metadata["VALUES"] = "1 visible, 0 hidden, 255 unknown";
@@ -263,7 +386,7 @@ class ViewshedRun {
                      std::size_t end) {
     const bool as_elevation = options_.mode == ViewshedMode::kDem;
     if (as_elevation) add_ground(least_m);
-    RasterLayer layer = layer_over(ground_.dem, std::span<const float>(least_m),
+    RasterLayer layer = layer_over(source_->dem(), std::span<const float>(least_m),
                                    as_elevation ? "least elevation seen" : "least height seen");
     layer.unit = "m";
     layer.nodata = std::numeric_limits<double>::quiet_NaN();
@@ -277,8 +400,8 @@ class ViewshedRun {
 
   /// Heights above ground become heights above the datum of the data, rounded up.
   void add_ground(std::span<float> least_m) const {
-    const GroundGrid& grid = ground_.grid;
-    const Dem& dem = ground_.dem;
+    const GroundGrid& grid = source_->samples();
+    const Dem& dem = source_->dem();
     const bool has_geoid = !dem.frame->description().geoid_file.empty();
     parallel_for(static_cast<std::size_t>(grid.rows()), [&](std::size_t r) {
       const auto row = static_cast<std::int32_t>(r);
@@ -300,22 +423,26 @@ class ViewshedRun {
   /// What the run was, for whoever opens the raster.
   void describe(std::map<std::string, std::string>& metadata, std::size_t first,
                 std::size_t end) const {
-    const FrameDescription& frame = ground_.dem.frame->description();
+    const FrameDescription& frame = source_->dem().frame->description();
     constexpr std::size_t kMostNamed = 32;
     std::string observers;
     for (std::size_t i = first; i < std::min(end, first + kMostNamed); ++i)
       observers += fmt::format("{}{:.10g},{:.10g},{:.3f}asl", i > first ? " " : "",
                                eyes_[i].at.map.x, eyes_[i].at.map.y, eyes_[i].at.map.height_m);
-    metadata["MODE"] = name_of(options_.mode);
-    metadata["SURFACE"] = "grid";
+    metadata["MODE"] = options_.total ? "total" : name_of(options_.mode);
+    metadata["SURFACE"] = source_->surface();
     metadata["EARTH"] = frame.earth == Earth::kFlat ? "flat" : "ellipsoid";
     metadata["REFRACTION"] = fmt::format("{:g}", frame.refraction);
     metadata["HEIGHTS"] = frame.earth == Earth::kFlat ? "above the map plane"
                           : frame.geoid_file.empty()  ? "taken as ellipsoidal"
                                                       : "geoid added";
-    metadata["HEIGHT_UNIT_OF_DEM"] = ground_.dem.height_unit;
-    metadata["OBSERVERS"] = std::to_string(end - first);
-    metadata["OBSERVER"] = observers;
+    metadata["HEIGHT_UNIT_OF_DEM"] = source_->dem().height_unit;
+    if (!options_.total) {
+      metadata["OBSERVERS"] = std::to_string(end - first);
+      metadata["OBSERVER"] = observers;
+    }
+    if (source_->has_obstacles())
+      metadata["OBSTACLES"] = std::filesystem::path(options_.obstacles.front()).filename().string();
     if (!options_.observers_file.empty())
       metadata["OBSERVERS_FILE"] =
           std::filesystem::path(options_.observers_file).filename().string();
@@ -336,10 +463,14 @@ class ViewshedRun {
 
   nlohmann::json summary() const {
     nlohmann::json result = {{"output", options_.output},
-                             {"columns", ground_.grid.columns()},
-                             {"rows", ground_.grid.rows()},
+                             {"columns", source_->samples().columns()},
+                             {"rows", source_->samples().rows()},
                              {"observers", eyes_.size()}};
-    if (least_) {
+    if (!options_.polygons.empty()) result["polygons"] = options_.polygons;
+    if (options_.total) {
+      result["looks"] = looks_;
+      result["exact"] = looks_share_ == 1;
+    } else if (least_) {
       const auto heights_m = least_->heights_m();
       result["unknown_samples"] =
           std::count_if(heights_m.begin(), heights_m.end(), [](float h) { return std::isnan(h); });
@@ -363,11 +494,11 @@ class ViewshedRun {
   }
 
   void print() const {
-    for (const std::string& warning : ground_.dem.warnings)
+    for (const std::string& warning : source_->dem().warnings)
       fmt::print(stderr, "scarp: warning: {}\n", warning);
     nlohmann::json result = summary();
     if (options_.common.json) {
-      result["warnings"] = ground_.dem.warnings;
+      result["warnings"] = source_->dem().warnings;
       result["decided"] = {{"targets", decided_.targets},
                            {"compared_with_part", decided_.traced_part},
                            {"judged_whole", decided_.traced_whole}};
@@ -377,7 +508,10 @@ class ViewshedRun {
       fmt::print("{}\n", result.dump(2));
       return;
     }
-    if (least_) {
+    if (options_.total) {
+      fmt::print("{}: ground seen from {} samples, {}\n", options_.output, areas_km2_.size(),
+                 looks_share_ == 1 ? "exact" : fmt::format("from {} looks", looks_));
+    } else if (least_) {
       fmt::print("{}: heights of {} samples, {} unknown or out of the limits\n", options_.output,
                  least_->heights_m().size(), result["unknown_samples"].get<std::size_t>());
     } else if (count_) {
@@ -393,12 +527,15 @@ class ViewshedRun {
 
   const ViewshedOptions& options_;
   Stages stages_;
-  Ground ground_;
+  std::optional<ViewSource> source_;
   std::vector<RunEye> eyes_;
   LargeArray<Seen> sight_;
   std::optional<AnyEye> any_;
   std::optional<EyeCount> count_;
   std::optional<LeastHeight> least_;
+  std::vector<float> areas_km2_;  // of --total
+  std::size_t looks_ = 0;
+  double looks_share_ = 1;  // of the known samples
   std::vector<float> eye_heights_m_;
   SampleWindow window_;  // of the eye last seen from
   std::vector<std::uint8_t> gdal_values_;

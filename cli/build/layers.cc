@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/sight/line_of_sight.h"
 #include "core/threads/parallel_for.h"
+#include "core/viewshed/tin_viewshed.h"
+#include "ingest/dem/ground_placement.h"
 #include "tiles/layers/outline.h"
 
 namespace scarp {
@@ -25,16 +26,6 @@ TriangleIndex triangle_near(const SampleGrid& grid, const TinIndex& index, const
     }
   }
   return kNone;
-}
-
-/// The sample's place on the TIN, at or just above its ground.
-Position on_ground(const TinIndex& index, const Position& sample) {
-  Position p = sample;
-  const auto ground_m = index.ground_height_m(p.x_m, p.y_m);
-  if (!ground_m) return p;
-  p.z_m = std::ceil(*ground_m / kLatticeStepM) * kLatticeStepM;
-  if (index.above_ground(p).value_or(0) < 0) p.z_m += kLatticeStepM;
-  return p;
 }
 
 double plan_area_m2(const Tin& tin, TriangleIndex t) {
@@ -67,29 +58,17 @@ std::vector<std::int32_t> group_of_samples(const std::vector<TriangleIndex>& tri
   return values;
 }
 
-std::vector<std::uint8_t> viewshed_of_samples(const SampleGrid& grid,
-                                              const std::vector<TriangleIndex>& triangle_of_sample,
-                                              const TinIndex& index, const Position& eye,
-                                              const Progress& progress) {
-  std::vector<std::uint8_t> values(grid.positions.size(), kUnknownValue);
-  const auto columns = static_cast<std::size_t>(grid.columns);
-  // Rows in slices, so that progress is told from one thread.
-  constexpr std::size_t kSlices = 50;
-  const auto rows = static_cast<std::size_t>(grid.rows);
-  for (std::size_t slice = 0; slice < kSlices; ++slice) {
-    const std::size_t first = rows * slice / kSlices, last = rows * (slice + 1) / kSlices;
-    parallel_for(last - first, [&](std::size_t offset) {
-      const std::size_t start = (first + offset) * columns;
-      for (std::size_t i = start; i < start + columns; ++i) {
-        if (triangle_of_sample[i] == kNone) continue;
-        const Sight sight = line_of_sight(index, eye, on_ground(index, grid.positions[i]));
-        values[i] = sight == Sight::kVisible  ? kVisibleValue
-                    : sight == Sight::kHidden ? kHiddenValue
-                                              : kUnknownValue;
-      }
-    });
-    if (progress) progress(static_cast<double>(slice + 1) / kSlices);
-  }
+std::vector<std::uint8_t> viewshed_of_samples(const Dem& dem, const TinIndex& index,
+                                              const Position& eye, const Progress& progress) {
+  GroundGrid samples(dem.columns, dem.rows, ground_placement(dem));
+  stand_on(index, samples);
+  std::vector<std::uint8_t> values(static_cast<std::size_t>(dem.columns) *
+                                   static_cast<std::size_t>(dem.rows));
+  static_assert(static_cast<std::uint8_t>(Seen::kVisible) == kVisibleValue &&
+                static_cast<std::uint8_t>(Seen::kHidden) == kHiddenValue &&
+                static_cast<std::uint8_t>(Seen::kUnknown) == kUnknownValue);
+  tin_viewshed(index, samples, eye, 0, whole_window(samples),
+               std::span(reinterpret_cast<Seen*>(values.data()), values.size()), progress);
   return values;
 }
 

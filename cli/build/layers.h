@@ -32,13 +32,11 @@ std::vector<TriangleIndex> triangle_of_samples(const SampleGrid& grid, const Tin
 std::vector<std::int32_t> group_of_samples(const std::vector<TriangleIndex>& triangle_of_sample,
                                            const Groups& groups);
 
-/// What an eye sees of the TIN at each sample, by the judge. Targets stand on the TIN, rounded up
-/// to the lattice. Side: a target is never lower than the ground, by at most two lattice steps
-/// higher. [rows * columns] of the values above
-std::vector<std::uint8_t> viewshed_of_samples(const SampleGrid& grid,
-                                              const std::vector<TriangleIndex>& triangle_of_sample,
-                                              const TinIndex& index, const Position& eye,
-                                              const Progress& progress);
+/// What an eye sees of the TIN at each sample, by the judge, as `scarp viewshed SCENE` has it.
+/// Targets stand on the TIN, rounded up to the lattice. Side: a target is never lower than the
+/// ground, by at most two lattice steps higher. [rows * columns] of the values above
+std::vector<std::uint8_t> viewshed_of_samples(const Dem& dem, const TinIndex& index,
+                                              const Position& eye, const Progress& progress);
 
 /// Outlines of the groups in map coordinates, with what the polygons layer tells about each.
 /// @param heights_m  of the vertices, above the datum of the data

@@ -237,6 +237,12 @@ void take_maximum(std::size_t count, const float* __restrict values, float* __re
 }
 
 SCARP_FOR_EACH_TARGET
+void take_top(std::size_t bins, const float* __restrict up, const float* __restrict high,
+              std::int32_t line, std::int32_t* __restrict top) {
+  for (std::size_t b = 0; b < bins; ++b) top[b] = up[b] >= high[b] ? line : top[b];
+}
+
+SCARP_FOR_EACH_TARGET
 void classify(std::size_t count, const float* __restrict t, const float* __restrict s,
               std::int32_t bins, const float* __restrict low, const float* __restrict high,
               float slope_margin, Decision* __restrict decision) {

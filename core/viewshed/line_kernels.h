@@ -91,6 +91,10 @@ void take_pairs(std::size_t count, const float* values, float* pairs);
 /// For each bin the greater of two values.
 void take_maximum(std::size_t count, const float* values, float* into);
 
+/// Where a line's upper bound is the highest of all, it becomes the bin's line.
+void take_top(std::size_t bins, const float* up, const float* high, std::int32_t line,
+              std::int32_t* top);
+
 enum class Decision : std::uint8_t { kHidden = 0, kVisible = 1, kOpen = 2 };
 
 /// Targets against the bounds of their bins.

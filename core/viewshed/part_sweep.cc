@@ -12,7 +12,9 @@
 #include "core/geodesy/predicates.h"
 #include "core/threads/parallel_for.h"
 #include "core/viewshed/bin_history.h"
+#include "core/viewshed/least_height.h"
 #include "core/viewshed/line_kernels.h"
+#include "core/viewshed/ray_climb.h"
 
 namespace scarp {
 namespace {
@@ -45,7 +47,8 @@ struct SweepGround {
   /// off their grid lines.
   double steepest_m = 0;
 
-  SweepGround(const GroundGrid& grid, const PlanFrame& frame, double target_height_m);
+  SweepGround(const GroundGrid& grid, const PlanFrame& frame, double target_height_m,
+              const SampleWindow& window);
 };
 
 namespace {
@@ -58,14 +61,20 @@ double unevenness(const std::vector<double>& places) {
   return most;
 }
 
-double steepest_step_m(const GroundGrid& grid) {
-  std::vector<std::int64_t> of_row(static_cast<std::size_t>(grid.rows()));
+/// Around the samples of a window and those beside them.
+double steepest_step_m(const GroundGrid& grid, const SampleWindow& window) {
+  constexpr std::int32_t kBeside = 2;
+  const std::int32_t first_row = std::max(0, window.first_row - kBeside);
+  const std::int32_t last_row = std::min(grid.rows() - 1, window.last_row + kBeside);
+  const std::int32_t first_column = std::max(0, window.first_column - kBeside);
+  const std::int32_t last_column = std::min(grid.columns() - 1, window.last_column + kBeside);
+  std::vector<std::int64_t> of_row(static_cast<std::size_t>(last_row - first_row + 1));
   parallel_for(of_row.size(), [&](std::size_t r) {
-    const auto row = static_cast<std::int32_t>(r);
+    const auto row = first_row + static_cast<std::int32_t>(r);
     const std::int32_t* here = grid.row_steps(row);
     const std::int32_t* below = row + 1 < grid.rows() ? grid.row_steps(row + 1) : here;
     std::int64_t most = 0;
-    for (std::int32_t c = 0; c < grid.columns(); ++c) {
+    for (std::int32_t c = first_column; c <= last_column; ++c) {
       if (here[c] == GroundGrid::kVoid) continue;
       for (const std::int32_t next : {c + 1 < grid.columns() ? here[c + 1] : here[c], below[c]})
         if (next != GroundGrid::kVoid)
@@ -78,7 +87,8 @@ double steepest_step_m(const GroundGrid& grid) {
 
 }  // namespace
 
-SweepGround::SweepGround(const GroundGrid& grid, const PlanFrame& frame, double target_height_m) {
+SweepGround::SweepGround(const GroundGrid& grid, const PlanFrame& frame, double target_height_m,
+                         const SampleWindow& window) {
   if (const auto* separable = std::get_if<SeparablePlacement>(&grid.placement())) {
     for (const double x : separable->x_of_column_m)
       across_of_column.push_back(frame.across(x, frame.eye_y_m));
@@ -87,7 +97,7 @@ SweepGround::SweepGround(const GroundGrid& grid, const PlanFrame& frame, double 
     uneven_samples = std::max(unevenness(across_of_column), unevenness(down_of_row));
   }
   if (target_height_m != 0 && std::holds_alternative<BlockPlacement>(grid.placement()))
-    steepest_m = steepest_step_m(grid);
+    steepest_m = steepest_step_m(grid, window);
 }
 
 /// The picture of a grid line: its samples around the part.
@@ -163,7 +173,7 @@ class PartSweep::Run {
  public:
   /// Either result or least_m is empty.
   Run(const PartSweep& sweep, const SweepPart& part, std::span<Seen> result,
-      std::span<float> least_m);
+      std::span<float> least_m, const LeastSoFar* so_far = nullptr);
   SweepCounts run();
 
  private:
@@ -181,9 +191,21 @@ class PartSweep::Run {
     return over_columns_ ? window_.contains(line, i) : window_.contains(i, line);
   }
   Position target(std::int32_t line, std::int32_t i) const {
-    return over_columns_ ? grid_.raised(line, i, target_height_m_)
-                         : grid_.raised(i, line, target_height_m_);
+    return over_columns_ ? stands_.raised(line, i, target_height_m_)
+                         : stands_.raised(i, line, target_height_m_);
   }
+  /// The ground that a target stands on.
+  Position stand(std::int32_t line, std::int32_t i) const {
+    return over_columns_ ? stands_.at(line, i) : stands_.at(i, line);
+  }
+  /// On a ground of its own a target may stand beside the sample that blocks, by what the normal
+  /// leans over the height between them; the bin is that of the sample.
+  bool stands_aside(std::int32_t line, std::int32_t i) const {
+    if (!apart_) return false;
+    const Position at = stand(line, i), over = position(line, i);
+    return at.x_m != over.x_m || at.y_m != over.y_m;
+  }
+  bool raised() const { return target_height_m_ != 0 || apart_; }
   Seen judge(std::int32_t line, std::int32_t i) {
     ++counts_.traced_whole;
     return over_columns_ ? sight_.judge(target(line, i), line, i)
@@ -227,8 +249,13 @@ class PartSweep::Run {
   void decide(const Line& line, const Line* before);
   void climb(const Line& line, const Line* before);
   float climb_all(std::int32_t line, std::int32_t i);
-  float climb_in_bin(std::int32_t line, std::int32_t i, std::size_t bin);
-  float height_up_to(double z_m, std::int32_t line, std::int32_t i) const;
+  float climb_to(const Line& line, const Line* before, std::int32_t k, float enough_m);
+  float climb_in_bin(const Line& line, std::int32_t k, std::size_t bin, float enough_m);
+  bool is_blocked_in_bin(const Line& line, std::int32_t k, std::size_t bin, float s);
+  bool is_enough(double z_m, const Line& line, std::int32_t k, float enough_m) const;
+  void offer(std::int32_t line, std::int32_t i, float height_m);
+  void mark_top(std::int32_t line, const float* up);
+  std::pair<double, double> place_of(const Line& line, std::int32_t k) const;
   std::pair<std::int32_t, std::int32_t> own_range(const Line& line) const;
   void take_targets(const Line& line);
   Seen decide_seen(const Line& line, const Line* before, std::int32_t k, Decision decision);
@@ -242,13 +269,16 @@ class PartSweep::Run {
   void mark_void(const Line& line);
 
   const GridSight& sight_;
-  const GroundGrid& grid_;
+  const GroundGrid& grid_;    ///< what blocks
+  const GroundGrid& stands_;  ///< what targets stand on
+  const bool apart_;          ///< whether these are two
   const PlanFrame& frame_;
   const SweepGround& ground_;
   double target_height_m_;
   SampleWindow window_;
   std::span<Seen> result_;
   std::span<float> least_m_;
+  const LeastSoFar* so_far_;  ///< null where every height is wanted
   SweepPart part_;
 
   bool over_columns_ = true;
@@ -261,6 +291,7 @@ class PartSweep::Run {
   /// Bounds of the horizon by bin.
   std::int32_t bins_ = kFirstBins;
   std::vector<float> low_, high_;
+  std::vector<std::int32_t> top_;  ///< line that reaches highest so far; for heights only
   std::vector<std::uint8_t> some_void_, all_void_;
   BinHistory history_;
 
@@ -282,19 +313,23 @@ class PartSweep::Run {
 };
 
 PartSweep::Run::Run(const PartSweep& sweep, const SweepPart& part, std::span<Seen> result,
-                    std::span<float> least_m)
+                    std::span<float> least_m, const LeastSoFar* so_far)
     : sight_(sweep.sight_),
       grid_(sight_.grid()),
+      stands_(sweep.stands_),
+      apart_(&grid_ != &stands_),
       frame_(sight_.frame()),
       ground_(sweep.ground_),
       target_height_m_(sweep.target_height_m_),
       window_(sweep.window_),
       result_(result),
       least_m_(least_m),
+      so_far_(so_far),
       part_(part),
       uneven_samples_(ground_.uneven_samples),
       low_(kFirstBins, kNoGround),
       high_(kFirstBins, kNoGround),
+      top_(kFirstBins, -1),
       some_void_(kFirstBins, 0),
       all_void_(kFirstBins, 0) {
   over_columns_ = part.wedge == SweepPart::kEast || part.wedge == SweepPart::kWest;
@@ -397,7 +432,7 @@ void PartSweep::Run::sweep_near(std::int32_t line, bool judge_targets) {
       if (least_m_.empty())
         result_[result_index(line, i)] = judge(line, i);
       else
-        least_m_[result_index(line, i)] = climb_all(line, i);
+        offer(line, i, climb_all(line, i));
     }
   }
   std::copy(edge_high_.begin(), edge_high_.end(), up);
@@ -406,6 +441,7 @@ void PartSweep::Run::sweep_near(std::int32_t line, bool judge_targets) {
     low_[b] = std::max(low_[b], line_low_[b]);
     high_[b] = std::max(high_[b], edge_high_[b]);
   }
+  mark_top(line, up);
 }
 
 void PartSweep::Run::add_near_segment(const Position& u, bool u_known, const Position& v,
@@ -471,6 +507,7 @@ void PartSweep::Run::halve_bins() {
   };
   split(low_);
   split(high_);
+  split(top_);
   split(some_void_);
   split(all_void_);
   bins_ *= 2;
@@ -614,7 +651,11 @@ void PartSweep::Run::take_targets(const Line& line) {
   target_t_.resize(count);
   target_s_.resize(count);
   raised_m_.resize(count);
-  if (std::holds_alternative<BlockPlacement>(grid_.placement())) {
+  if (apart_) {
+    for (std::size_t k = 0; k < count; ++k)
+      raised_m_[k] =
+          line.is_void[k] ? 0 : target(line.number, line.first + static_cast<std::int32_t>(k)).z_m;
+  } else if (std::holds_alternative<BlockPlacement>(grid_.placement())) {
     for_blocks(line.number, line.first, count,
                [&](const BlockPlacement::Block& block, std::size_t k, std::size_t length, double u,
                    double du, double v, double dv) {
@@ -660,7 +701,7 @@ Seen PartSweep::Run::decide_seen(const Line& line, const Line* before, std::int3
                                  Decision decision) {
   const auto n = static_cast<std::size_t>(k);
   const std::int32_t i = line.first + k;
-  const bool raised = target_height_m_ != 0;
+  const bool raised = this->raised();
   const float t = raised ? target_t_[n] : line.t[n], s = raised ? target_s_[n] : line.s[n];
   if (before && crosses_before(*before, i, t)) return judge(line.number, i);
   if (raised && !stands_free(target(line.number, i), line.number, i)) return judge(line.number, i);
@@ -705,7 +746,7 @@ void PartSweep::Run::decide(const Line& line, const Line* before) {
   if (first == end) return;
   const auto n = static_cast<std::size_t>(first);
   const auto count = static_cast<std::size_t>(end - first);
-  const bool raised = target_height_m_ != 0;
+  const bool raised = this->raised();
   if (raised) take_targets(line);
   decisions_.resize(line.t.size());
   classify(count, (raised ? target_t_ : line.t).data() + n,
@@ -751,66 +792,155 @@ void PartSweep::Run::decide(const Line& line, const Line* before) {
   }
 }
 
-/// Height above a sample, along its normal, of a flattened height, rounded up; 0 below ground.
-float PartSweep::Run::height_up_to(double z_m, std::int32_t line, std::int32_t i) const {
-  const std::int32_t column = over_columns_ ? line : i, row = over_columns_ ? i : line;
-  if (z_m >= kLatticeReachM) return std::numeric_limits<float>::infinity();
-  if (z_m <= grid_.at(column, row).z_m) return 0;
-  // A target is put on the lattice: one step up holds whichever way it is rounded.
-  const double height_m = grid_.height_above_ground_m(column, row, z_m) + kLatticeStepM;
-  const auto rounded = static_cast<float>(height_m);
-  return rounded < height_m ? std::nextafter(rounded, std::numeric_limits<float>::infinity())
-                            : rounded;
-}
-
 float PartSweep::Run::climb_all(std::int32_t line, std::int32_t i) {
   ++counts_.traced_whole;
-  bool over_void = false;
-  const double z_m = over_columns_ ? sight_.least_z_m(position(line, i), line, i, over_void)
-                                   : sight_.least_z_m(position(line, i), i, line, over_void);
-  return over_void ? std::numeric_limits<float>::quiet_NaN() : height_up_to(z_m, line, i);
+  return over_columns_ ? least_height_m(sight_, stands_, line, i)
+                       : least_height_m(sight_, stands_, i, line);
 }
 
-/// The highest that any line makes it: those that may be above the highest so far are tried.
-float PartSweep::Run::climb_in_bin(std::int32_t line, std::int32_t i, std::size_t bin) {
+/// Keeps in mind which line reaches highest in each bin. Requires its bounds in high_.
+void PartSweep::Run::mark_top(std::int32_t line, const float* up) {
+  if (!least_m_.empty())
+    take_top(static_cast<std::size_t>(bins_), up, high_.data(), line, top_.data());
+}
+
+/// Forwards and sideways of a sample of the line that was filled last.
+std::pair<double, double> PartSweep::Run::place_of(const Line& line, std::int32_t k) const {
+  if (ground_.across_of_column.empty()) {
+    const auto n = static_cast<std::size_t>(k);
+    return over_columns_ ? std::pair(across_[n], down_[n]) : std::pair(down_[n], across_[n]);
+  }
+  const auto& along = over_columns_ ? ground_.down_of_row : ground_.across_of_column;
+  const auto& outwards = over_columns_ ? ground_.across_of_column : ground_.down_of_row;
+  return {outwards_ * outwards[static_cast<std::size_t>(line.number)],
+          along[static_cast<std::size_t>(line.first + k)]};
+}
+
+/// Is a target at a flattened height, and so all that is higher, at least enough_m above the
+/// ground?
+bool PartSweep::Run::is_enough(double z_m, const Line& line, std::int32_t k, float enough_m) const {
+  // Within a scene a height in the frame is never twice that on the normal.
+  const std::int32_t i = line.first + k;
+  const double ground_m =
+      apart_ ? stand(line.number, i).z_m : line.z_m[static_cast<std::size_t>(k)];
+  const double rise_m = z_m - ground_m;
+  if (rise_m <= 0 || rise_m < enough_m) return false;
+  if (rise_m >= 2.0 * enough_m) return true;
+  return stands_.height_above_ground_m(over_columns_ ? line.number : i,
+                                       over_columns_ ? i : line.number, z_m) >= enough_m;
+}
+
+/// Does the ground block the sight of a sample? Decided exactly, as decide_seen does.
+bool PartSweep::Run::is_blocked_in_bin(const Line& line, std::int32_t k, std::size_t bin, float s) {
+  const std::int32_t i = line.first + k;
+  const Position at = stand(line.number, i);
+  const float least_s = s - 4 * kSlopeMargin * std::abs(s);
+  return history_.any_line(
+      static_cast<std::int32_t>(bin), bins_, least_s, [&](std::int32_t across) {
+        return sight_.is_blocked_between(at, over_columns_ ? line.number : i,
+                                         over_columns_ ? i : line.number, over_columns_, across,
+                                         across - outwards_);
+      });
+}
+
+/// The highest that any line makes it: first the line that reaches highest in the bin, then those
+/// that may still be above the highest so far.
+float PartSweep::Run::climb_in_bin(const Line& line, std::int32_t k, std::size_t bin,
+                                   float enough_m) {
   ++counts_.traced_part;
-  const Position at = position(line, i);
-  const double forwards = picture(at).forwards;
+  const std::int32_t i = line.first + k;
+  const auto [forwards, sideways] = place_of(line, k);
+  const double eye_z_m = sight_.eye().z_m;
+  const RayClimb ray(grid_, frame_, eye_z_m, over_columns_, outwards_, forwards, sideways);
   const auto below = [](float s) { return s - 4 * kSlopeMargin * std::abs(s); };
   float least_s = below(low_[bin]);
-  double least_z_m = -std::numeric_limits<double>::infinity();
+  double highest = -std::numeric_limits<double>::infinity();
+  const auto climb_over = [&](std::int32_t across) {
+    const double s =
+        std::abs(across - eye_line_) > RayClimb::kLeastLines
+            ? ray.slope_at(across)
+            : (sight_.least_z_between_m(stand(line.number, i), over_columns_ ? line.number : i,
+                                        over_columns_ ? i : line.number, over_columns_, across,
+                                        across - outwards_) -
+               eye_z_m) /
+                  forwards;
+    if (s <= highest) return;
+    highest = s;
+    least_s = std::max(least_s, below(static_cast<float>(s)));
+  };
+  const std::int32_t top = top_[bin];
+  if (top >= 0) climb_over(top);
+  if (is_enough(eye_z_m + highest * forwards - kClimbErrorM, line, k, enough_m))
+    return std::numeric_limits<float>::quiet_NaN();
   history_.any_line(static_cast<std::int32_t>(bin), bins_, least_s, [&](std::int32_t across) {
-    const double z_m =
-        sight_.least_z_between_m(at, over_columns_ ? line : i, over_columns_ ? i : line,
-                                 over_columns_, across, across - outwards_);
-    if (z_m > least_z_m) {
-      least_z_m = z_m;
-      least_s = std::max(least_s, below(static_cast<float>((z_m - sight_.eye().z_m) / forwards)));
-    }
+    if (across != top) climb_over(across);
     return false;
   });
-  return height_up_to(least_z_m, line, i);
+  const double ground_m = stand(line.number, i).z_m;
+  const double z_m = eye_z_m + highest * forwards;
+  if (z_m < ground_m - kClimbErrorM) return 0;
+  if (z_m < ground_m + kClimbErrorM &&
+      !is_blocked_in_bin(line, k, bin, static_cast<float>((ground_m - eye_z_m) / forwards)))
+    return 0;
+  return height_up_to(stands_, std::max(z_m, ground_m) + kClimbErrorM,
+                      over_columns_ ? line.number : i, over_columns_ ? i : line.number);
+}
+
+/// Least height over a sample of a line; NaN where that is not known, or where it cannot be less
+/// than enough_m.
+float PartSweep::Run::climb_to(const Line& line, const Line* before, std::int32_t k,
+                               float enough_m) {
+  const auto n = static_cast<std::size_t>(k);
+  const std::int32_t i = line.first + k;
+  const auto bin =
+      static_cast<std::size_t>(std::clamp(line.t[n], 0.0F, static_cast<float>(bins_ - 1)));
+  if (!bounds_hold_ || stands_aside(line.number, i)) return climb_all(line.number, i);
+  if (all_void_[bin]) return std::numeric_limits<float>::quiet_NaN();
+  if (so_far_) {
+    const float s = low_[bin] - kSlopeMargin * std::abs(low_[bin]);
+    if (is_enough(sight_.eye().z_m + s * place_of(line, k).first, line, k, enough_m))
+      return std::numeric_limits<float>::quiet_NaN();
+  }
+  if (some_void_[bin] || (before && crosses_before(*before, i, line.t[n])))
+    return climb_all(line.number, i);
+  float s = line.s[n];
+  if (apart_) {
+    const Position at = stand(line.number, i);
+    s = static_cast<float>((at.z_m - sight_.eye().z_m) / place_of(line, k).first);
+  }
+  if (s >= high_[bin] + kSlopeMargin * std::abs(s)) return 0;
+  return climb_in_bin(line, k, bin, enough_m);
+}
+
+/// Writes a height, or, where only lower ones are wanted, sees to it that it is one.
+void PartSweep::Run::offer(std::int32_t line, std::int32_t i, float height_m) {
+  float& to = least_m_[result_index(line, i)];
+  if (!so_far_) {
+    to = height_m;
+    return;
+  }
+  if (to <= height_m || !std::isfinite(height_m)) return;
+  if (so_far_->limit)
+    height_m = so_far_->limit(over_columns_ ? line : i, over_columns_ ? i : line, height_m);
+  if (height_m < to || (std::isnan(to) && !std::isnan(height_m))) to = height_m;
 }
 
 /// decide, for heights: what is not seen on the ground climbs until it is.
 void PartSweep::Run::climb(const Line& line, const Line* before) {
   const auto [first, end] = own_range(line);
-  const auto bins = static_cast<float>(bins_);
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
   for (std::int32_t k = first; k < end; ++k) {
-    const auto n = static_cast<std::size_t>(k);
-    if (line.is_void[n]) continue;
+    if (line.is_void[static_cast<std::size_t>(k)]) continue;
     ++counts_.targets;
     const std::int32_t i = line.first + k;
-    const auto bin = static_cast<std::size_t>(std::clamp(line.t[n], 0.0F, bins - 1));
-    float& to = least_m_[result_index(line.number, i)];
-    if (bounds_hold_ && all_void_[bin])
-      to = std::numeric_limits<float>::quiet_NaN();
-    else if (!bounds_hold_ || some_void_[bin] || (before && crosses_before(*before, i, line.t[n])))
-      to = climb_all(line.number, i);
-    else if (line.s[n] >= high_[bin] + kSlopeMargin * std::abs(line.s[n]))
-      to = 0;
-    else
-      to = climb_in_bin(line.number, i, bin);
+    float enough_m = kInfinity;
+    if (so_far_) {
+      const float so_far_m = least_m_[result_index(line.number, i)];
+      if (so_far_m <= 0) continue;
+      if (!std::isnan(so_far_m)) enough_m = so_far_m;
+    }
+    const float height_m = climb_to(line, before, k, enough_m);
+    if (!so_far_ || !std::isnan(height_m)) offer(line.number, i, height_m);
   }
 }
 
@@ -856,6 +986,7 @@ void PartSweep::Run::add_whole(const Line& line, const Line* before) {
                   edge_before_.data(), this_s_.data(), next_s_.data(), edge_low_.data(),
                   edge_high_.data(), up, low_.data(), high_.data()))
     bounds_hold_ = false;
+  mark_top(line.number, up);
   history_.end_line();
 }
 
@@ -866,8 +997,9 @@ void PartSweep::Run::add_in_pieces(const Line& line, const Line* before) {
   if (before) raise_segments(*before, line, up);
   raise_line(line, up);
   if (line.has_void) mark_void(line);
-  history_.end_line();
   take_maximum(static_cast<std::size_t>(bins_), up, high_.data());
+  mark_top(line.number, up);
+  history_.end_line();
 }
 
 /// The segments between the last line and this one: each is taken as high as its higher end in
@@ -995,9 +1127,13 @@ void PartSweep::Run::sweep_line(std::int32_t line, bool is_first) {
   std::swap(line_, before_);
 }
 
-PartSweep::PartSweep(const GridSight& sight, const SweepGround& ground, double target_height_m,
-                     const SampleWindow& window)
-    : sight_(sight), ground_(ground), target_height_m_(target_height_m), window_(window) {}
+PartSweep::PartSweep(const GridSight& sight, const GroundGrid& stands, const SweepGround& ground,
+                     double target_height_m, const SampleWindow& window)
+    : sight_(sight),
+      stands_(stands),
+      ground_(ground),
+      target_height_m_(target_height_m),
+      window_(window) {}
 
 SweepCounts PartSweep::run(const SweepPart& part, std::span<Seen> result) {
   return Run(*this, part, result, {}).run();
@@ -1005,6 +1141,11 @@ SweepCounts PartSweep::run(const SweepPart& part, std::span<Seen> result) {
 
 SweepCounts PartSweep::run_heights(const SweepPart& part, std::span<float> least_m) {
   return Run(*this, part, {}, least_m).run();
+}
+
+SweepCounts PartSweep::lower_heights(const SweepPart& part, std::span<float> least_m,
+                                     const LeastSoFar& so_far) {
+  return Run(*this, part, {}, least_m, &so_far).run();
 }
 
 namespace {
@@ -1063,19 +1204,24 @@ std::size_t index_in(const GroundGrid& grid, const Under& under) {
 }  // namespace
 
 SweepCounts sweep_viewshed(const GroundGrid& grid, const Position& eye, double target_height_m,
-                           const SampleWindow& window, std::span<Seen> result) {
+                           const SampleWindow& window, std::span<Seen> result,
+                           const GroundGrid* stands) {
   assert(result.size() ==
          static_cast<std::size_t>(grid.columns()) * static_cast<std::size_t>(grid.rows()));
   if (window.last_column < window.first_column || window.last_row < window.first_row) return {};
   const GridSight sight(grid, eye);
-  const SweepGround ground(grid, sight.frame(), target_height_m);
+  // On grounds of their own targets stand off the grid's lines, however little they are raised.
+  const SweepGround ground(grid, sight.frame(), stands && stands != &grid ? 1 : target_height_m,
+                           window);
   fill_window(grid, window, Seen::kUnknown, result);
   SweepCounts counts = for_parts([&](const SweepPart& part) {
-    return PartSweep(sight, ground, target_height_m, window).run(part, result);
+    return PartSweep(sight, stands ? *stands : grid, ground, target_height_m, window)
+        .run(part, result);
   });
   if (const auto under = sample_under(sight, window)) {
-    result[index_in(grid, *under)] = sight.judge(
-        grid.raised(under->column, under->row, target_height_m), under->column, under->row);
+    result[index_in(grid, *under)] =
+        sight.judge((stands ? *stands : grid).raised(under->column, under->row, target_height_m),
+                    under->column, under->row);
     ++counts.targets;
     ++counts.traced_whole;
   }
@@ -1083,19 +1229,42 @@ SweepCounts sweep_viewshed(const GroundGrid& grid, const Position& eye, double t
 }
 
 SweepCounts sweep_heights(const GroundGrid& grid, const Position& eye, const SampleWindow& window,
-                          std::span<float> least_m) {
+                          std::span<float> least_m, const GroundGrid* stands) {
   assert(least_m.size() ==
          static_cast<std::size_t>(grid.columns()) * static_cast<std::size_t>(grid.rows()));
   if (window.last_column < window.first_column || window.last_row < window.first_row) return {};
   const GridSight sight(grid, eye);
-  const SweepGround ground(grid, sight.frame(), 0);
+  const SweepGround ground(grid, sight.frame(), 0, window);
   fill_window(grid, window, std::numeric_limits<float>::quiet_NaN(), least_m);
   SweepCounts counts = for_parts([&](const SweepPart& part) {
-    return PartSweep(sight, ground, 0, window).run_heights(part, least_m);
+    return PartSweep(sight, stands ? *stands : grid, ground, 0, window).run_heights(part, least_m);
   });
   if (const auto under = sample_under(sight, window)) {
-    const bool above = grid.at(under->column, under->row).z_m <= eye.z_m;
-    least_m[index_in(grid, *under)] = above ? 0 : std::numeric_limits<float>::infinity();
+    least_m[index_in(grid, *under)] =
+        least_height_m(sight, stands ? *stands : grid, under->column, under->row);
+    ++counts.targets;
+  }
+  return counts;
+}
+
+SweepCounts lower_heights(const GroundGrid& grid, const Position& eye, const SampleWindow& window,
+                          const HeightLimit& limit, std::span<float> least_m,
+                          const GroundGrid* stands) {
+  assert(least_m.size() ==
+         static_cast<std::size_t>(grid.columns()) * static_cast<std::size_t>(grid.rows()));
+  if (window.last_column < window.first_column || window.last_row < window.first_row) return {};
+  const GridSight sight(grid, eye);
+  const SweepGround ground(grid, sight.frame(), 0, window);
+  const LeastSoFar so_far{limit};
+  SweepCounts counts = for_parts([&](const SweepPart& part) {
+    return PartSweep(sight, stands ? *stands : grid, ground, 0, window)
+        .lower_heights(part, least_m, so_far);
+  });
+  if (const auto under = sample_under(sight, window)) {
+    float& to = least_m[index_in(grid, *under)];
+    const float found_m = least_height_m(sight, stands ? *stands : grid, under->column, under->row);
+    if (std::isfinite(found_m))
+      to = std::fmin(to, limit ? limit(under->column, under->row, found_m) : found_m);
     ++counts.targets;
   }
   return counts;

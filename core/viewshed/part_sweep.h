@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -21,8 +22,17 @@ struct SweepPart {
   std::int32_t number = 0;  ///< [0, kPartsInWedge), by rising tangent
 };
 
+/// What a least height becomes under limits other than the ground: the same, more, or NaN where no
+/// height will do. Called from several threads; empty where there are none.
+using HeightLimit = std::function<float(std::int32_t column, std::int32_t row, float least_m)>;
+
 /// What all parts of a sweep share; made by sweep_viewshed.
 struct SweepGround;
+
+/// How heights are taken that are to be lower than those of the eyes before; see lower_heights.
+struct LeastSoFar {
+  HeightLimit limit;
+};
 
 /// How the samples of a sweep were decided.
 struct SweepCounts {
@@ -54,10 +64,12 @@ struct SweepCounts {
 class PartSweep {
  public:
   /// @param sight, ground    for the same grid, eye and target height, kept by reference
+  /// @param stands           what targets stand on: the grid, or another one of the same placement
+  ///                         and with the same known samples
   /// @param target_height_m  of targets above their samples
   /// @param window           samples outside are no targets, though they block
-  PartSweep(const GridSight& sight, const SweepGround& ground, double target_height_m,
-            const SampleWindow& window);
+  PartSweep(const GridSight& sight, const GroundGrid& stands, const SweepGround& ground,
+            double target_height_m, const SampleWindow& window);
 
   /// @param result[out]  [rows * columns]; the part's known samples in the window are written,
   /// others left
@@ -65,27 +77,46 @@ class PartSweep {
 
   /// Instead: how high above each sample, along its normal, a target must be at least to be seen.
   /// @param least_m[out]  [rows * columns] metres, rounded up (by less than 1 mm and float's own
-  ///                      step); 0 where the ground is seen, NaN where the line is over void
-  ///                      ground, infinite above an eye under ground
+  ///                      step) for a target straight over the sample in the frame, from which a
+  ///                      normal leans aside a little; 0 where the ground is seen, NaN where the
+  ///                      line is over void ground, infinite above an eye under ground
   SweepCounts run_heights(const SweepPart& part, std::span<float> least_m);
+
+  /// The same where only what is lower than the heights so far is of interest: nothing is compared
+  /// exactly whose lower bound is above those already.
+  SweepCounts lower_heights(const SweepPart& part, std::span<float> least_m,
+                            const LeastSoFar& so_far);
 
  private:
   struct Line;
   class Run;
 
   const GridSight& sight_;
+  const GroundGrid& stands_;
   const SweepGround& ground_;
   double target_height_m_;
   SampleWindow window_;
 };
 
-/// PartSweep::run_heights for all parts; NaN where a sample is void.
+/// PartSweep::run_heights for all parts; NaN where a sample is void. 0 exactly where sweep_viewshed
+/// says kVisible of targets on the ground.
 SweepCounts sweep_heights(const GroundGrid& grid, const Position& eye, const SampleWindow& window,
-                          std::span<float> least_m);
+                          std::span<float> least_m, const GroundGrid* stands = nullptr);
+
+/// Lowers the heights so far of several eyes to those of one more, within limits.
+/// @param least_m[in, out]  [rows * columns] NaN where no eye has any; the lesser of what it is and
+///                          what sweep_heights finds, after limit, where that is finite
+/// Cost: with many eyes little more than sweep_viewshed, because most samples are seen lower
+/// already.
+SweepCounts lower_heights(const GroundGrid& grid, const Position& eye, const SampleWindow& window,
+                          const HeightLimit& limit, std::span<float> least_m,
+                          const GroundGrid* stands = nullptr);
 
 /// All parts on all threads. The same bits for any number of threads.
 /// @param result[out]  [rows * columns]; the window is written, kUnknown where the sample is void
+/// @param stands       what targets stand on where that is not the grid that blocks; see PartSweep
 SweepCounts sweep_viewshed(const GroundGrid& grid, const Position& eye, double target_height_m,
-                           const SampleWindow& window, std::span<Seen> result);
+                           const SampleWindow& window, std::span<Seen> result,
+                           const GroundGrid* stands = nullptr);
 
 }  // namespace scarp

@@ -68,6 +68,18 @@ Bearing EyeBearings::to(const Position& target) const {
           std::atan2(up_m, level_m)};
 }
 
+bool EyeBearings::surely_within(const ViewLimits& limits, const Position& target) const {
+  if (!limits.only_distance()) return false;
+  const double reach_m = std::min(limits.max_distance_m, kShortM) / 1.01;
+  if (!earth_) {
+    const double east_m = target.x_m - eye_.x_m, north_m = target.y_m - eye_.y_m;
+    return east_m * east_m + north_m * north_m < reach_m * reach_m;
+  }
+  const EcefPoint at = earth_->frame.unflatten(target);
+  const EcefPoint line{at.x_m - eye_ecef_.x_m, at.y_m - eye_ecef_.y_m, at.z_m - eye_ecef_.z_m};
+  return dot(line, line) < reach_m * reach_m;
+}
+
 double EyeBearings::apparent_pitch_rad(const Position& target) const {
   if (!earth_) return to(target).pitch_rad;
   // The tangent as the chord between two places of the ray, so near that it errs by rounding only.

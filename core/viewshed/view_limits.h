@@ -19,6 +19,9 @@ struct ViewLimits {
   double min_pitch_rad = -2;  ///< of the straight line from the eye to the target, above level
   double max_pitch_rad = 2;
 
+  bool only_distance() const {
+    return !(min_distance_m > 0 || azimuth_begin_rad || min_pitch_rad > -2 || max_pitch_rad < 2);
+  }
   bool any() const {
     return min_distance_m > 0 || max_distance_m < std::numeric_limits<double>::infinity() ||
            azimuth_begin_rad || min_pitch_rad > -2 || max_pitch_rad < 2;
@@ -43,11 +46,18 @@ class EyeBearings {
   /// @param earth  nothing for the flat earth
   EyeBearings(const Position& eye, const std::optional<EarthFrame>& earth);
   Bearing to(const Position& target) const;
+  /// Is a target within the limits for certain, without its bearing? True only where no more than
+  /// the greatest distance is limited and the target is nearer by a hundredth and more: the ground
+  /// between is longer than the straight line by less than that up to kShortM, with ground down to
+  /// 20 km under the ellipsoid. Cost: a tenth of to().
+  bool surely_within(const ViewLimits& limits, const Position& target) const;
   /// Pitch at which the eye sees a target: of the ray where it leaves the eye, which refraction
   /// bends away from the straight line. Requires a target elsewhere in plan. Error below 1e-8 rad.
   double apparent_pitch_rad(const Position& target) const;
 
  private:
+  static constexpr double kShortM = 500'000;
+
   Position eye_;
   std::optional<EarthFrame> earth_;
   EcefPoint eye_ecef_, east_, north_, up_;

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/threads/parallel_for.h"
+#include "core/viewshed/tin_viewshed.h"
 
 namespace scarp {
 namespace {
@@ -13,7 +14,7 @@ namespace {
 /// on all threads.
 template <typename Body>
 void for_rows(const SampleWindow& window, const Body& body) {
-  if (window.last_row < window.first_row) return;
+  if (window.last_row < window.first_row || window.last_column < window.first_column) return;
   constexpr std::int32_t kRowsPerTask = 32;
   const std::int32_t rows = window.last_row - window.first_row + 1;
   parallel_for(static_cast<std::size_t>((rows + kRowsPerTask - 1) / kRowsPerTask),
@@ -33,7 +34,8 @@ void keep_within(const GroundGrid& grid, const EyeBearings& bearings, const View
       Seen& at = sight[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.columns()) +
                        static_cast<std::size_t>(column)];
       if (at == Seen::kHidden || !grid.is_known(column, row)) continue;
-      if (!within(eye.limits, bearings.to(grid.raised(column, row, eye.target_height_m))))
+      const Position target = grid.raised(column, row, eye.target_height_m);
+      if (!bearings.surely_within(eye.limits, target) && !within(eye.limits, bearings.to(target)))
         at = Seen::kHidden;
     }
   });
@@ -53,6 +55,9 @@ float climb_to_pitch(const GroundGrid& grid, const EyeBearings& bearings, const 
     return bearings.to(grid.raised(column, row, height_m)).pitch_rad;
   };
   constexpr float kNever = std::numeric_limits<float>::quiet_NaN();
+  if (limits.min_pitch_rad <= ViewLimits().min_pitch_rad &&
+      limits.max_pitch_rad >= ViewLimits().max_pitch_rad)
+    return least_m;
   constexpr double kHighestM = 100'000;
   if (pitch_at(least_m) < limits.min_pitch_rad) {
     double low_m = least_m, high_m = kHighestM;
@@ -66,13 +71,43 @@ float climb_to_pitch(const GroundGrid& grid, const EyeBearings& bearings, const 
   return pitch_at(least_m) > limits.max_pitch_rad ? kNever : least_m;
 }
 
+SweepCounts all_judged(const SampleWindow& window) {
+  SweepCounts counts;
+  if (window.last_column < window.first_column || window.last_row < window.first_row) return counts;
+  counts.targets = counts.traced_whole =
+      static_cast<std::uint64_t>(window.last_column - window.first_column + 1) *
+      static_cast<std::uint64_t>(window.last_row - window.first_row + 1);
+  return counts;
+}
+
+/// The least height at a sample within an eye's limits, from that which the ground leaves.
+float within_limits(const GroundGrid& grid, const EyeBearings& bearings, const ViewLimits& limits,
+                    std::int32_t column, std::int32_t row, float least_m) {
+  ViewLimits aside = limits;
+  aside.min_pitch_rad = ViewLimits().min_pitch_rad;
+  aside.max_pitch_rad = ViewLimits().max_pitch_rad;
+  const Position ground = grid.at(column, row);
+  if (bearings.surely_within(limits, ground)) return least_m;
+  return within(aside, bearings.to(ground))
+             ? climb_to_pitch(grid, bearings, limits, column, row, least_m)
+             : std::numeric_limits<float>::quiet_NaN();
+}
+
 }  // namespace
 
-SampleWindow heights_from(const GroundGrid& grid, const std::optional<EarthFrame>& earth,
+SampleWindow heights_from(const ViewGround& ground, const std::optional<EarthFrame>& earth,
                           const ViewshedEye& eye, std::span<float> least_m, SweepCounts* counts) {
+  const GroundGrid& grid = ground.stands;
   const EyeBearings bearings(eye.position, earth);
   const SampleWindow window = window_of(grid, eye, bearings);
-  const SweepCounts found = sweep_heights(grid, eye.position, window, least_m);
+  SweepCounts found;
+  if (ground.tin) {
+    tin_heights(*ground.tin, grid, eye.position, window, least_m);
+    found = all_judged(window);
+  } else {
+    found = sweep_heights(ground.obstacles ? *ground.obstacles : grid, eye.position, window,
+                          least_m, &grid);
+  }
   if (counts) *counts = found;
   for_rows(window, [&](std::int32_t row) {
     for (std::int32_t column = window.first_column; column <= window.last_column; ++column) {
@@ -80,15 +115,29 @@ SampleWindow heights_from(const GroundGrid& grid, const std::optional<EarthFrame
                           static_cast<std::size_t>(column)];
       if (std::isinf(at)) at = std::numeric_limits<float>::quiet_NaN();
       if (std::isnan(at) || !eye.limits.any()) continue;
-      ViewLimits aside = eye.limits;
-      aside.min_pitch_rad = ViewLimits().min_pitch_rad;
-      aside.max_pitch_rad = ViewLimits().max_pitch_rad;
-      at = within(aside, bearings.to(grid.at(column, row)))
-               ? climb_to_pitch(grid, bearings, eye.limits, column, row, at)
-               : std::numeric_limits<float>::quiet_NaN();
+      at = within_limits(grid, bearings, eye.limits, column, row, at);
     }
   });
   return window;
+}
+
+void LeastHeight::lower(const ViewGround& ground, const std::optional<EarthFrame>& earth,
+                        const ViewshedEye& eye, SweepCounts* counts) {
+  const GroundGrid& grid = ground.stands;
+  if (ground.tin) {
+    std::vector<float> own_m(least_m_.size());
+    add(heights_from(ground, earth, eye, own_m, counts), own_m);
+    return;
+  }
+  const EyeBearings bearings(eye.position, earth);
+  HeightLimit limit;
+  if (eye.limits.any())
+    limit = [&](std::int32_t column, std::int32_t row, float least_m) {
+      return within_limits(grid, bearings, eye.limits, column, row, least_m);
+    };
+  const SweepCounts found = lower_heights(ground.obstacles ? *ground.obstacles : grid, eye.position,
+                                          window_of(grid, eye, bearings), limit, least_m_, &grid);
+  if (counts) *counts = found;
 }
 
 LeastHeight::LeastHeight(const GroundGrid& grid)
@@ -105,11 +154,19 @@ void LeastHeight::add(const SampleWindow& window, std::span<const float> least_m
   });
 }
 
-SampleWindow view_from(const GroundGrid& grid, const std::optional<EarthFrame>& earth,
+SampleWindow view_from(const ViewGround& ground, const std::optional<EarthFrame>& earth,
                        const ViewshedEye& eye, std::span<Seen> sight, SweepCounts* counts) {
+  const GroundGrid& grid = ground.stands;
   const EyeBearings bearings(eye.position, earth);
   const SampleWindow window = window_of(grid, eye, bearings);
-  const SweepCounts found = sweep_viewshed(grid, eye.position, eye.target_height_m, window, sight);
+  SweepCounts found;
+  if (ground.tin) {
+    tin_viewshed(*ground.tin, grid, eye.position, eye.target_height_m, window, sight);
+    found = all_judged(window);
+  } else {
+    found = sweep_viewshed(ground.obstacles ? *ground.obstacles : grid, eye.position,
+                           eye.target_height_m, window, sight, &grid);
+  }
   if (counts) *counts = found;
   if (eye.limits.any()) keep_within(grid, bearings, eye, window, sight);
   return window;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/geodesy/earth_frame.h"
+#include "core/sight/tin_index.h"
 #include "core/terrain/ground_grid.h"
 #include "core/viewshed/grid_sight.h"
 #include "core/viewshed/part_sweep.h"
@@ -20,12 +21,37 @@ struct ViewshedEye {
   ViewLimits limits;           ///< targets outside count as hidden
 };
 
-/// What one eye sees within its limits, exactly what GridSight judges.
+/// What targets stand on, and what blocks them.
+struct ViewGround {
+  /// The grid is both.
+  // NOLINTNEXTLINE(google-explicit-constructor): a grid is the plain case
+  ViewGround(const GroundGrid& grid) : stands(grid) {}
+
+  /// The samples are on the ground, the obstacles above it block. Both have one placement and the
+  /// same known samples.
+  static ViewGround under(const GroundGrid& samples, const GroundGrid& obstacles) {
+    ViewGround ground(samples);
+    ground.obstacles = &obstacles;
+    return ground;
+  }
+  /// The samples are on a TIN (stand_on), which blocks.
+  static ViewGround of_tin(const GroundGrid& samples, const TinIndex& tin) {
+    ViewGround ground(samples);
+    ground.tin = &tin;
+    return ground;
+  }
+
+  const GroundGrid& stands;
+  const GroundGrid* obstacles = nullptr;
+  const TinIndex* tin = nullptr;
+};
+
+/// What one eye sees within its limits, exactly what GridSight or line_of_sight judges.
 /// @param earth        of the grid's frame; nothing where it is flat
 /// @param sight[out]   [rows * columns]; only the window returned is written
 /// @return the window within reach; outside it nothing is within the limits
 /// Cost: see PartSweep; with limits besides distance, a bearing for each sample seen.
-SampleWindow view_from(const GroundGrid& grid, const std::optional<EarthFrame>& earth,
+SampleWindow view_from(const ViewGround& ground, const std::optional<EarthFrame>& earth,
                        const ViewshedEye& eye, std::span<Seen> sight,
                        SweepCounts* counts = nullptr);
 
@@ -33,7 +59,7 @@ SampleWindow view_from(const GroundGrid& grid, const std::optional<EarthFrame>& 
 /// metres along the normal, rounded up: NaN where that is not known (over void ground) or not to be
 /// had at any height. Distance and azimuth are those of the sample, pitch that of the target.
 /// @param least_m[out]  [rows * columns]; only the window returned is written
-SampleWindow heights_from(const GroundGrid& grid, const std::optional<EarthFrame>& earth,
+SampleWindow heights_from(const ViewGround& ground, const std::optional<EarthFrame>& earth,
                           const ViewshedEye& eye, std::span<float> least_m,
                           SweepCounts* counts = nullptr);
 
@@ -69,6 +95,10 @@ class EyeCount {
 class LeastHeight {
  public:
   explicit LeastHeight(const GroundGrid& grid);
+  /// Takes in what heights_from finds for one more eye, without a raster of its own.
+  /// Cost: with many eyes near that of view_from; see lower_heights.
+  void lower(const ViewGround& ground, const std::optional<EarthFrame>& earth,
+             const ViewshedEye& eye, SweepCounts* counts = nullptr);
   void add(const SampleWindow& window, std::span<const float> least_m);
   std::span<float> heights_m() { return least_m_; }
   std::span<const float> heights_m() const { return least_m_; }

@@ -457,7 +457,8 @@ std::uint64_t read_rows_into(GroundGrid& grid, const Dem& dem, const Source& sou
 /// Refuses before allocating what will not fit.
 void check_memory(const Dem& dem, const DemOptions& options, double bytes_per_sample,
                   const std::string& file) {
-  const double needed = static_cast<double>(dem.columns) * dem.rows * bytes_per_sample;
+  const double needed = static_cast<double>(dem.columns) * dem.rows *
+                        (bytes_per_sample + options.more_bytes_per_sample);
   if (options.memory_budget_bytes && needed > static_cast<double>(options.memory_budget_bytes))
     throw Error(ErrorCode::kResource,
                 fmt::format("'{}': {} x {} samples need about {:.1f} GiB, and --memory allows "

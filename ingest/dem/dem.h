@@ -22,6 +22,7 @@ struct DemOptions {
   std::optional<std::string> height_unit;  ///< m, ft or us-ft; overrides what the file says
   std::optional<double> nodata;            ///< a value that stands for void, besides the file's
   std::uint64_t memory_budget_bytes = 0;   ///< 0: no limit
+  double more_bytes_per_sample = 0;        ///< that the command takes besides, of the budget
 };
 
 /// What a sample takes in memory from reading to the finished mesh: height, position, marks, and

@@ -1,6 +1,8 @@
 #include <gdal_priv.h>
 #include <gtest/gtest.h>
+#include <ogrsf_frmts.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -24,22 +26,30 @@ class ViewshedCommand : public testing::Test {
 
   void SetUp() override {
     GDALAllRegister();
-    dem_ = folder_.path("dem.tif");
+    dem_ = write_dem("dem.tif", kColumns, 0);
+  }
+
+  /// @param more_m  on the samples of the ninth column, a hedge
+  std::string write_dem(const std::string& name, int columns, float more_m,
+                        const char* crs_name = "EPSG:32611") {
+    const std::string path = folder_.path(name);
     GDALDataset* dataset = GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
-        dem_.c_str(), kColumns, kRows, 1, GDT_Float32, nullptr);
+        path.c_str(), columns, kRows, 1, GDT_Float32, nullptr);
     double transform[6] = {500'000, 100, 0, 4'000'000, 0, -100};
     dataset->SetGeoTransform(transform);
     OGRSpatialReference crs;
-    crs.SetFromUserInput("EPSG:32611");
+    crs.SetFromUserInput(crs_name);
     dataset->SetSpatialRef(&crs);
-    std::vector<float> heights(kColumns * kRows, 10);
-    for (int r = 0; r < kRows; ++r) heights[static_cast<std::size_t>(r * kColumns + 5)] = 50;
-    for (int c = 0; c < kColumns; ++c) heights[static_cast<std::size_t>(5 * kColumns + c)] = -99;
+    std::vector<float> heights(static_cast<std::size_t>(columns * kRows), 10);
+    for (int r = 0; r < kRows; ++r) heights[static_cast<std::size_t>(r * columns + 5)] = 50;
+    for (int r = 0; r < kRows; ++r) heights[static_cast<std::size_t>(r * columns + 8)] += more_m;
+    for (int c = 0; c < columns; ++c) heights[static_cast<std::size_t>(5 * columns + c)] = -99;
     dataset->GetRasterBand(1)->SetNoDataValue(-99);
-    EXPECT_EQ(dataset->GetRasterBand(1)->RasterIO(GF_Write, 0, 0, kColumns, kRows, heights.data(),
-                                                  kColumns, kRows, GDT_Float32, 0, 0),
+    EXPECT_EQ(dataset->GetRasterBand(1)->RasterIO(GF_Write, 0, 0, columns, kRows, heights.data(),
+                                                  columns, kRows, GDT_Float32, 0, 0),
               CE_None);
     GDALClose(dataset);
+    return path;
   }
 
   RunResult view(const std::string& options, const std::string& output = "out.tif") {
@@ -115,6 +125,83 @@ TEST_F(ViewshedCommand, EyesFromAFile) {
   EXPECT_EQ(read("each/east_1.tif")[5], 0);
 }
 
+TEST_F(ViewshedCommand, ObstaclesHideTheGroundUnderAndBehindThem) {
+  const std::string hedged = write_dem("dsm.tif", kColumns, 10);
+  const std::string eye = "--observer 501150,3999850";
+  ASSERT_EQ(view(eye).exit_code, 0);
+  EXPECT_EQ(read()[kColumns + 8], 1);
+  EXPECT_EQ(read()[kColumns + 6], 1);
+  ASSERT_EQ(view(eye + " --obstacles " + hedged + " --overwrite").exit_code, 0);
+  EXPECT_EQ(read()[kColumns + 9], 1);
+  EXPECT_EQ(read()[kColumns + 6], 0);
+  EXPECT_EQ(read()[kColumns + 5], 1);  // the wall behind is higher
+  const GDALDatasetUniquePtr out(
+      GDALDataset::Open(folder_.path("out.tif").c_str(), GDAL_OF_RASTER));
+  EXPECT_STREQ(out->GetMetadataItem("OBSTACLES"), "dsm.tif");
+}
+
+TEST_F(ViewshedCommand, PolygonsHoldTheVisibleCells) {
+  const std::string outlines = folder_.path("seen.gpkg");
+  ASSERT_EQ(view(std::string(kEye) + " --polygons " + outlines).exit_code, 0);
+  const GDALDatasetUniquePtr file(GDALDataset::Open(outlines.c_str(), GDAL_OF_VECTOR));
+  ASSERT_NE(file, nullptr);
+  OGRLayer* layer = file->GetLayerByName("areas");
+  ASSERT_NE(layer, nullptr);
+  EXPECT_NE(layer->GetSpatialRef(), nullptr);
+  double area_m2 = 0;
+  for (auto& feature : layer) {
+    EXPECT_EQ(feature->GetFieldAsInteger64("visible"), 1);
+    ASSERT_TRUE(feature->GetGeometryRef()->IsValid());
+    area_m2 += feature->GetGeometryRef()->toPolygon()->get_Area();
+  }
+  const std::vector<double> values = read();
+  EXPECT_NEAR(area_m2, 1e4 * static_cast<double>(std::count(values.begin(), values.end(), 1)), 1);
+}
+
+TEST_F(ViewshedCommand, TotalIsTheAreaThatEachSampleSees) {
+  ASSERT_EQ(view("--total --earth flat --json").exit_code, 0);
+  const std::vector<double> values = read();
+  EXPECT_TRUE(std::isnan(values[kColumns * 5]));
+  // West of the wall 5 columns and the wall's own are seen, in 5 rows of a hectare each.
+  EXPECT_NEAR(values[kColumns + 1], 0.30, 0.001);
+  EXPECT_NEAR(values[kColumns + 8], 0.35, 0.001);
+  const GDALDatasetUniquePtr out(
+      GDALDataset::Open(folder_.path("out.tif").c_str(), GDAL_OF_RASTER));
+  EXPECT_EQ(std::string(out->GetMetadataItem("ACCURACY")).substr(0, 5), "exact");
+  ASSERT_EQ(view("--total --samples 20 --overwrite").exit_code, 0);
+  const GDALDatasetUniquePtr drawn(
+      GDALDataset::Open(folder_.path("out.tif").c_str(), GDAL_OF_RASTER));
+  EXPECT_EQ(std::string(drawn->GetMetadataItem("ACCURACY")).substr(0, 21), "estimated from 20 of ");
+}
+
+TEST_F(ViewshedCommand, SceneIsSeenAsItsLayerIs) {
+  const std::string scene = folder_.path("a.scene");
+  ASSERT_EQ(run_scarp("$SCARP build " + dem_ + " -o " + scene).exit_code, 0);
+  const GDALDatasetUniquePtr layer(
+      GDALDataset::Open((scene + "/layers/viewshed.tif").c_str(), GDAL_OF_RASTER));
+  ASSERT_NE(layer, nullptr);
+  const std::string observer = layer->GetMetadataItem("OBSERVER");
+  const RunResult result = run_scarp("$SCARP viewshed " + scene + " --observer " + observer +
+                                     " -o " + folder_.path("out.tif"));
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  std::vector<double> expected(kColumns * kRows);
+  ASSERT_EQ(layer->GetRasterBand(1)->RasterIO(GF_Read, 0, 0, kColumns, kRows, expected.data(),
+                                              kColumns, kRows, GDT_Float64, 0, 0),
+            CE_None);
+  EXPECT_EQ(read(), expected);
+  const GDALDatasetUniquePtr out(
+      GDALDataset::Open(folder_.path("out.tif").c_str(), GDAL_OF_RASTER));
+  EXPECT_STREQ(out->GetMetadataItem("SURFACE"), "tin");
+  EXPECT_EQ(run_scarp("$SCARP viewshed " + scene + " --refraction 0.1 --observer " + observer +
+                      " -o " + folder_.path("no.tif"))
+                .exit_code,
+            2);
+  EXPECT_EQ(run_scarp("$SCARP viewshed " + scene + " --mode ground --observer " + observer +
+                      " -o " + folder_.path("out.tif") + " --overwrite")
+                .exit_code,
+            0);
+}
+
 TEST_F(ViewshedCommand, RefusesInOneLineAndLeavesNothing) {
   const auto refused = [&](const std::string& options, int code, const std::string& words) {
     const RunResult result = view(options);
@@ -132,6 +219,14 @@ TEST_F(ViewshedCommand, RefusesInOneLineAndLeavesNothing) {
   refused(std::string(kEye) + " --min-distance 50 --max-distance 20", 2, "--min-distance");
   refused(std::string(kEye) + " --each " + folder_.path("nowhere"), 1, "folder");
   refused("--observer 500150,3999450,1000asl --crs EPSG:0", 1, "EPSG:0");
+  refused("--total " + std::string(kEye), 2, "--observer does not go with --total");
+  refused("--total --azimuth 1,2", 2, "--azimuth");
+  // 72 samples of 12 bytes, of 15 where eyes are counted.
+  refused(std::string(kEye) + " --mode count --memory 1000", 1, "--memory");
+  refused(std::string(kEye) + " --mode dem --polygons " + folder_.path("a.gpkg"), 2, "--polygons");
+  refused(std::string(kEye) + " --obstacles " + write_dem("other.tif", 11, 0), 1, "11 x 6 cells");
+  refused(std::string(kEye) + " --obstacles " + write_dem("zone12.tif", kColumns, 0, "EPSG:32612"),
+          1, "another coordinate system");
   EXPECT_EQ(view("--observer 500150,3999450,1000asl").exit_code, 0);
   EXPECT_EQ(view(kEye).exit_code, 1);
   EXPECT_EQ(view(std::string(kEye) + " --overwrite").exit_code, 0);

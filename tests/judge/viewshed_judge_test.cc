@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -12,27 +14,31 @@
 #include "core/viewshed/part_sweep.h"
 #include "ingest/dem/dem.h"
 #include "ingest/dem/ground_placement.h"
+#include "tests/support/dem_list.h"
 #include "tests/support/shared_data.h"
 #include "tests/support/temp_folder.h"
 
 namespace scarp {
 namespace {
 
-/// SCARP_PROVE_VIEWSHEDS=1 takes whole DEMs instead of windows.
-bool proving() {
-  return std::getenv("SCARP_PROVE_VIEWSHEDS") != nullptr;
+/// SCARP_PROVE_VIEWSHEDS=SIDE takes windows of up to SIDE x SIDE samples, which of most DEMs is
+/// all.
+int proved_side() {
+  const char* side = std::getenv("SCARP_PROVE_VIEWSHEDS");
+  return side ? std::atoi(side) : 0;
 }
 
-/// Side of the windows that are taken from the middle of a DEM.
-constexpr int kWindow = 90;
+/// Side of the windows that are taken from the middle of a DEM otherwise.
+constexpr int kWindow = 80;
 
 /// A window as a file of its own, which keeps CRS and nodata.
 std::string window_of(const std::string& dem, const test::TempFolder& folder) {
   GDALAllRegister();
   const GDALDatasetUniquePtr from(GDALDataset::Open(dem.c_str(), GDAL_OF_RASTER));
   const int columns = from->GetRasterXSize(), rows = from->GetRasterYSize();
-  const int width = proving() ? columns : std::min(columns, kWindow);
-  const int height = proving() ? rows : std::min(rows, kWindow - 13);
+  const int side = proved_side();
+  const int width = std::min(columns, side > 0 ? side : kWindow);
+  const int height = std::min(rows, side > 0 ? side : kWindow - 13);
   std::vector<std::string> words = {"-of", "VRT", "-srcwin"};
   for (const int n : {(columns - width) / 2, (rows - height) / 2, width, height})
     words.push_back(std::to_string(n));
@@ -51,28 +57,54 @@ struct Eye {
   std::int32_t column = 0, row = 0;
 };
 
-/// Highest, lowest and middle known sample: on a ridge, in a valley, on a slope.
+/// Greatest difference of height in the square around a sample; infinite where that is not all
+/// known ground.
+double relief_m(const GroundGrid& grid, std::int32_t column, std::int32_t row) {
+  constexpr std::int32_t kReach = 4;
+  double low_m = std::numeric_limits<double>::infinity(), high_m = -low_m;
+  for (std::int32_t r = row - kReach; r <= row + kReach; ++r) {
+    for (std::int32_t c = column - kReach; c <= column + kReach; ++c) {
+      if (c < 0 || r < 0 || c >= grid.columns() || r >= grid.rows() || !grid.is_known(c, r))
+        return std::numeric_limits<double>::infinity();
+      low_m = std::min(low_m, grid.height_m(c, r));
+      high_m = std::max(high_m, grid.height_m(c, r));
+    }
+  }
+  return high_m - low_m;
+}
+
+/// The highest known sample, the lowest and the flattest: on a ridge, in a valley, on a plain. Of
+/// equal ones that nearest to the middle.
 std::vector<Eye> eyes_of(const GroundGrid& grid) {
-  Eye highest{-1, 0}, lowest{-1, 0}, middle{-1, 0};
+  struct Best {
+    Eye at;
+    double value = std::numeric_limits<double>::infinity();
+    std::int32_t off_middle = 0;
+  };
+  Best ridge, valley, plain;
   for (std::int32_t r = 0; r < grid.rows(); ++r) {
     for (std::int32_t c = 0; c < grid.columns(); ++c) {
       if (!grid.is_known(c, r)) continue;
-      const double h = grid.height_m(c, r);
-      if (highest.column < 0 || h > grid.height_m(highest.column, highest.row)) highest = {c, r};
-      if (lowest.column < 0 || h < grid.height_m(lowest.column, lowest.row)) lowest = {c, r};
-      if (middle.column < 0 ||
-          std::abs(c - grid.columns() / 2) + std::abs(r - grid.rows() / 2) <
-              std::abs(middle.column - grid.columns() / 2) + std::abs(middle.row - grid.rows() / 2))
-        middle = {c, r};
+      const std::int32_t off = std::abs(c - grid.columns() / 2) + std::abs(r - grid.rows() / 2);
+      const auto offer = [&](Best& best, double value) {
+        if (value < best.value || (value == best.value && off < best.off_middle))
+          best = {{c, r}, value, off};
+      };
+      offer(ridge, -grid.height_m(c, r));
+      offer(valley, grid.height_m(c, r));
+      offer(plain, relief_m(grid, c, r));
     }
   }
-  return {highest, lowest, middle};
+  std::vector<Eye> eyes;
+  for (const Best& best : {ridge, valley, plain})
+    if (std::isfinite(best.value)) eyes.push_back(best.at);
+  return eyes;
 }
 
 struct Heights {
   double eye_m, target_m;
 };
-constexpr Heights kHeights[] = {{2, 0}, {2, 1.5}, {100, 0}, {10'000, 1.5}};
+constexpr Heights kHeights[] = {{2, 0}, {2, 1.5}, {100, 0}, {10'000, 0}, {10'000, 1.5}};
 
 /// Names the cells on which sweep and judge differ, over eyes on and between samples.
 void expect_equal(const std::string& file, const DemOptions& options) {
@@ -80,6 +112,7 @@ void expect_equal(const std::string& file, const DemOptions& options) {
   const auto columns = static_cast<std::size_t>(grid.columns());
   const std::size_t cells = columns * static_cast<std::size_t>(grid.rows());
   std::vector<Seen> judged(cells), swept(cells);
+  std::vector<float> least_m(cells);
   for (const Eye& at : eyes_of(grid)) {
     for (const auto& [eye_m, target_m] : kHeights) {
       const bool between = target_m > 0 && at.column > 0 && at.row > 0;
@@ -92,47 +125,96 @@ void expect_equal(const std::string& file, const DemOptions& options) {
         EXPECT_EQ(judged[i], swept[i])
             << "eye over " << at.column << "," << at.row << " at " << eye_m << " m, target "
             << target_m << " m: column " << i % columns << " row " << i / columns;
+      if (target_m > 0) continue;
+      sweep_heights(grid, eye, whole_window(grid), least_m);
+      for (std::size_t i = 0; i < cells; ++i)
+        EXPECT_EQ(judged[i] == Seen::kVisible, least_m[i] == 0)
+            << "eye over " << at.column << "," << at.row << " at " << eye_m << " m: column "
+            << i % columns << " row " << i / columns << " least height " << least_m[i];
     }
   }
 }
 
-class RealDems : public testing::TestWithParam<const char*> {};
+/// All rasters of ground in the collection: those of kListedDems, and copies, crops and large ones.
+std::vector<test::ListedDem> proved_dems() {
+  std::vector<test::ListedDem> dems(test::kListedDems.begin(), test::kListedDems.end());
+  dems.push_back({"vancouver-west", "geographic/N49W124_vancouver_srtm3.tif"});
+  dems.push_back({"nice", "geographic/N43E007.hgt.zip"});
+  dems.push_back({"xueshan", "projected/taiwan_xueshan_z13_webmercator.tif"});
+  dems.push_back({"taiwan", "scale/taiwan_north_20m_twd97.tif"});
+  dems.push_back({"north-carolina", "reference/grass_nc_elevation_10m.ascii", true});
+  return dems;
+}
+
+class RealDems : public testing::TestWithParam<test::ListedDem> {};
 
 TEST_P(RealDems, SweepEqualsJudge) {
-  SCARP_SHARED_OR_SKIP(dem, GetParam());
+  const test::ListedDem& listed = GetParam();
+  SCARP_SHARED_OR_SKIP(dem, listed.file);
   const test::TempFolder folder;
   const std::string window = window_of(dem, folder);
-  const std::string name = GetParam();
   DemOptions options;
-  if (name.find("crater_lake_30m") != std::string::npos) options.nodata = -32767;
-  const bool has_crs = name.find(".asc") == std::string::npos && name[0] != 'l';
-  const bool degrees = name.rfind("geographic/", 0) == 0;
-  if (has_crs) expect_equal(window, options);
-  if (!degrees || !has_crs) {
+  options.nodata = listed.nodata;
+  if (!listed.flat) expect_equal(window, options);
+  const bool degrees = std::string(listed.file).starts_with("geographic/");
+  if (!degrees || listed.flat) {
     options.earth = Earth::kFlat;
     expect_equal(window, options);
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    All, RealDems,
-    testing::Values("projected/bigtujunga_srtm30m_utm11.tif", "projected/mt_st_helens_usgs30m.dem",
-                    "projected/mandakini_srtm90_utm44.bil", "projected/meghalaya_50m_utm46.bil",
-                    "projected/gabilan_lidar1m.bil", "projected/slovenia_lidar1m_nan_nodata.tif",
-                    "projected/vinschgau_alps_250m_utm32.tif", "projected/new_zealand_1km_nztm.tif",
-                    "projected/taiwan_xueshan_z13_webmercator.tif",
-                    "geographic/N46E008_swiss_alps_srtm3.tif", "geographic/S33W071_aconcagua.dt1",
-                    "geographic/N27E086_everest_srtm3_voids.tif",
-                    "geographic/N35E138_fuji_srtm3.tif", "geographic/crater_lake_30m_wgs84.tif",
-                    "geographic/zion_srtm3_uint16.tif", "geographic/front_range_srtmgl3.asc",
-                    "literature/ashby_gap_va_i16.tif", "literature/crater_lake_west_i16.tif",
-                    "urban/czech_village_dsm1m_krovak.tif"),
-    [](const testing::TestParamInfo<const char*>& param) {
-      std::string name = param.param;
-      name = name.substr(name.find('/') + 1);
-      name = name.substr(0, name.find('.'));
-      return name;
-    });
+INSTANTIATE_TEST_SUITE_P(All, RealDems, testing::ValuesIn(proved_dems()),
+                         [](const testing::TestParamInfo<test::ListedDem>& param) {
+                           std::string name = param.param.name;
+                           std::replace(name.begin(), name.end(), '-', '_');
+                           return name;
+                         });
+
+/// Obstacles in a frame whose normals lean: a target under them stands beside their sample by what
+/// the normal leans over their height.
+TEST(ObstaclesOnTheEllipsoid, SweepEqualsJudge) {
+  SCARP_SHARED_OR_SKIP(dem, "projected/new_zealand_1km_nztm.tif");
+  const test::TempFolder folder;
+  const GroundGrid ground = read_ground({window_of(dem, folder)}, {}, {}).grid;
+  GroundGrid obstacles(ground.columns(), ground.rows(), ground.placement());
+  for (std::int32_t r = 0; r < ground.rows(); ++r)
+    for (std::int32_t c = 0; c < ground.columns(); ++c)
+      if (ground.is_known(c, r))
+        obstacles.set_z(c, r, ground.at(c, r).z_m + ((c * 7 + r * 3) % 11 < 3 ? 24 : 0));
+  const auto columns = static_cast<std::size_t>(ground.columns());
+  std::vector<Seen> seen(columns * static_cast<std::size_t>(ground.rows()));
+  std::vector<float> least_m(seen.size());
+  std::size_t aside = 0;
+  for (const Eye& at : eyes_of(ground)) {
+    for (const double eye_m : {30.0, 400.0}) {
+      const Position eye = ground.raised(at.column, at.row, eye_m);
+      const GridSight judge(obstacles, eye);
+      for (const double target_m : {0.0, 1.5}) {
+        sweep_viewshed(obstacles, eye, target_m, whole_window(ground), seen, &ground);
+        sweep_heights(obstacles, eye, whole_window(ground), least_m, &ground);
+        for (std::size_t i = 0; i < seen.size(); ++i) {
+          const auto c = static_cast<std::int32_t>(i % columns),
+                     r = static_cast<std::int32_t>(i / columns);
+          if (!ground.is_known(c, r)) continue;
+          EXPECT_EQ(seen[i], judge.judge(ground.raised(c, r, target_m), c, r))
+              << "column " << c << " row " << r << " target " << target_m;
+          aside += ground.at(c, r).x_m != obstacles.at(c, r).x_m;
+          if (target_m > 0) continue;
+          EXPECT_EQ(seen[i] == Seen::kVisible, least_m[i] == 0)
+              << "column " << c << " row " << r << " least height " << least_m[i] << " eye over "
+              << at.column << "," << at.row << " at " << eye_m;
+          if (std::isfinite(least_m[i])) {
+            Position over = ground.at(c, r);
+            over.z_m = ground.raised(c, r, least_m[i]).z_m;
+            EXPECT_EQ(judge.judge(over, c, r), Seen::kVisible)
+                << "column " << c << " row " << r << " height " << least_m[i];
+          }
+        }
+      }
+    }
+  }
+  EXPECT_GT(aside, 0U);
+}
 
 /// Positions may differ from the exact ones by what ground_placement promises and by the lattice.
 TEST(GroundPlacement, LiesWithinAMillimetreOfTheExactPlace) {

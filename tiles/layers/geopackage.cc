@@ -1,9 +1,11 @@
 #include "tiles/layers/geopackage.h"
 
 #include <cpl_string.h>
+#include <gdal_alg.h>
 #include <gdal_priv.h>
 #include <ogrsf_frmts.h>
 
+#include <algorithm>
 #include <array>
 #include <cassert>
 #include <memory>
@@ -74,27 +76,96 @@ void fill_layer(GDALDataset& dataset, std::span<const GroupPolygon> groups,
   if (dataset.CommitTransaction() != OGRERR_NONE) session.fail(path);
 }
 
-}  // namespace
+/// A raster in memory of two bands: values, and a mask of those that are to be outlined.
+GDALDatasetUniquePtr raster_in_memory(const RasterLayer& raster, const GdalSession& session,
+                                      const std::string& path) {
+  const auto count =
+      static_cast<std::size_t>(raster.columns) * static_cast<std::size_t>(raster.rows);
+  std::vector<std::int32_t> values(count);
+  std::vector<std::uint8_t> mask(count);
+  std::visit(
+      [&](const auto& samples) {
+        assert(samples.size() == count);
+        for (std::size_t i = 0; i < count; ++i) {
+          const auto value = static_cast<double>(samples[i]);
+          mask[i] = value != 0 && value != raster.nodata ? 1 : 0;
+          values[i] = mask[i] ? static_cast<std::int32_t>(value) : 0;
+        }
+      },
+      raster.samples);
+  GDALDriver* driver = GetGDALDriverManager()->GetDriverByName("MEM");
+  if (driver == nullptr) session.fail(path);
+  GDALDatasetUniquePtr dataset(
+      driver->Create("", raster.columns, raster.rows, 0, GDT_Int32, nullptr));
+  if (!dataset) session.fail(path);
+  std::array<double, 6> transform = raster.geotransform;
+  dataset->SetGeoTransform(transform.data());
+  const auto add = [&](GDALDataType type, void* data) {
+    if (dataset->AddBand(type, nullptr) != CE_None ||
+        dataset->GetRasterBand(dataset->GetRasterCount())
+                ->RasterIO(GF_Write, 0, 0, raster.columns, raster.rows, data, raster.columns,
+                           raster.rows, type, 0, 0, nullptr) != CE_None)
+      session.fail(path);
+  };
+  add(GDT_Int32, values.data());
+  add(GDT_Byte, mask.data());
+  return dataset;
+}
 
-void write_group_polygons(const std::string& path, std::span<const GroupPolygon> groups,
-                          const std::string& crs_wkt, Existing existing) {
+void outline_areas(GDALDataset& dataset, const RasterLayer& raster, const std::string& field,
+                   OGRSpatialReference* crs, const GdalSession& session, const std::string& path) {
+  const GDALDatasetUniquePtr values = raster_in_memory(raster, session, path);
+  if (dataset.StartTransaction() != OGRERR_NONE) session.fail(path);
+  OGRLayer* layer = dataset.CreateLayer("areas", crs, wkbPolygon, nullptr);
+  if (layer == nullptr) session.fail(path);
+  OGRFieldDefn definition(field.c_str(), OFTInteger64);
+  if (layer->CreateField(&definition) != OGRERR_NONE ||
+      GDALPolygonize(values->GetRasterBand(1), values->GetRasterBand(2), OGRLayer::ToHandle(layer),
+                     0, nullptr, nullptr, nullptr) != CE_None ||
+      dataset.CommitTransaction() != OGRERR_NONE)
+    session.fail(path);
+}
+
+/// Builds a GeoPackage in memory and puts it in its place. @param fill  (dataset, crs, session)
+template <typename Fill>
+void write_geopackage(const std::string& path, const std::string& crs_wkt, Existing existing,
+                      const Fill& fill) {
   PartFile file(path, existing);
   const GdalSession session;
   GDALDriver* driver = GetGDALDriverManager()->GetDriverByName("GPKG");
   if (driver == nullptr) session.fail(path);
-  const std::string built = session.folder() + "/groups.gpkg";
+  const std::string built = session.folder() + "/built.gpkg";
   GDALDatasetUniquePtr dataset(driver->Create(built.c_str(), 0, 0, 0, GDT_Unknown, nullptr));
   if (!dataset) session.fail(path);
   if (crs_wkt.empty()) {
-    fill_layer(*dataset, groups, nullptr, session, path);
+    fill(*dataset, nullptr, session);
   } else {
     OGRSpatialReference crs = spatial_reference(crs_wkt, path);
-    fill_layer(*dataset, groups, &crs, session, path);
+    fill(*dataset, &crs, session);
   }
   dataset.reset();  // closing writes the rest
   session.check(path);
   file.append(session.bytes_of(built, path));
   file.commit();
+}
+
+}  // namespace
+
+void write_group_polygons(const std::string& path, std::span<const GroupPolygon> groups,
+                          const std::string& crs_wkt, Existing existing) {
+  write_geopackage(path, crs_wkt, existing,
+                   [&](GDALDataset& dataset, OGRSpatialReference* crs, const GdalSession& session) {
+                     fill_layer(dataset, groups, crs, session, path);
+                   });
+}
+
+void write_area_polygons(const std::string& path, const RasterLayer& layer,
+                         const std::string& field, Existing existing) {
+  assert(!std::holds_alternative<std::span<const float>>(layer.samples));
+  write_geopackage(path, layer.crs_wkt, existing,
+                   [&](GDALDataset& dataset, OGRSpatialReference* crs, const GdalSession& session) {
+                     outline_areas(dataset, layer, field, crs, session, path);
+                   });
 }
 
 }  // namespace scarp

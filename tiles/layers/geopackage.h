@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "tiles/layers/geotiff.h"
 #include "tiles/store/part_file.h"
 
 namespace scarp {
@@ -41,5 +42,14 @@ struct GroupPolygon {
 /// beside the polygons.
 void write_group_polygons(const std::string& path, std::span<const GroupPolygon> groups,
                           const std::string& crs_wkt, Existing existing);
+
+/// Writes the outlines of what a raster of whole numbers shows: the layer "areas" of a GeoPackage,
+/// a polygon for each piece of cells of one value that hang together by edges, with the field
+/// `field`. Outlines follow the cells' edges. Cells of 0 and of nodata are left out.
+///
+/// @param layer  of uint8 or uint32 (asserted), values below 2^31 but for nodata; north-up
+/// Errors as write_group_polygons. Memory: nine bytes a cell, and the file twice.
+void write_area_polygons(const std::string& path, const RasterLayer& layer,
+                         const std::string& field, Existing existing);
 
 }  // namespace scarp

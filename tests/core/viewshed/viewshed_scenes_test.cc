@@ -125,6 +125,28 @@ TEST(ViewshedScenes, LimitsOfDistanceAzimuthAndPitch) {
   EXPECT_EQ(drawn(grid, eye, like)[2], "vhhhv");
 }
 
+TEST(Viewshed, EyeThatReachesNoSampleChangesNothing) {
+  const GroundGrid grid = scene({"0 0 0 0", "0 0 0 0"});
+  Position aside = grid.at(0, 0);
+  aside.x_m -= 5000;
+  ViewshedEye eye{aside, 0, {}};
+  eye.limits.max_distance_m = 100;
+  std::vector<Seen> seen(8, Seen::kHidden);
+  AnyEye any(grid);
+  EyeCount count(grid);
+  LeastHeight least(grid);
+  std::vector<float> least_m(8);
+  any.add(view_from(grid, {}, eye, seen), seen);
+  count.add(view_from(grid, {}, eye, seen), seen);
+  least.add(heights_from(grid, {}, eye, least_m), least_m);
+  least.lower(grid, {}, eye);
+  for (std::size_t i = 0; i < 8; ++i) {
+    EXPECT_EQ(any.seen()[i], Seen::kHidden);
+    EXPECT_EQ(count.counts()[i], 0U);
+    EXPECT_TRUE(std::isnan(least.heights_m()[i]));
+  }
+}
+
 TEST(Viewshed, SameForAnyNumberOfThreads) {
   const GroundGrid grid = test::random_ground({test::Relief::kSmooth, 150, 140, 1.0, 0.02, 5});
   const Position eye = over(grid, 70, 60, 2);

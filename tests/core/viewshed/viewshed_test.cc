@@ -1,3 +1,5 @@
+#include "core/viewshed/viewshed.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -166,6 +168,56 @@ TEST(SweepHeights, AreTheLeastAtWhichATargetIsSeen) {
       }
     }
   }
+}
+
+TEST(SweepHeights, AreZeroExactlyWhereTheGroundIsSeen) {
+  for (GroundRecipe recipe : recipes()) {
+    recipe.columns = 70;
+    recipe.rows = 61;
+    const GroundGrid grid = random_ground(recipe);
+    std::mt19937 random(recipe.seed);
+    std::vector<float> least_m(static_cast<std::size_t>(grid.columns() * grid.rows()));
+    for (const Position& eye : eyes_for(grid, random, 6)) {
+      sweep_heights(grid, eye, whole_window(grid), least_m);
+      const std::vector<Seen> seen = judged(grid, eye, 0);
+      for (std::size_t i = 0; i < seen.size(); ++i)
+        ASSERT_EQ(least_m[i] == 0, seen[i] == Seen::kVisible)
+            << "relief " << static_cast<int>(recipe.relief) << " bend " << recipe.bend << " void "
+            << recipe.void_share << " sample " << i << " height " << least_m[i];
+    }
+  }
+}
+
+/// Leaving out what cannot be lower leaves out nothing that is.
+TEST(LowerHeights, AreTheLeastOfEachEyesOwn) {
+  std::uint64_t compared = 0, climbed = 0;
+  for (GroundRecipe recipe : recipes()) {
+    recipe.columns = 60;
+    recipe.rows = 53;
+    const GroundGrid grid = random_ground(recipe);
+    std::mt19937 random(recipe.seed);
+    LeastHeight together(grid), apart(grid);
+    std::vector<float> own_m(static_cast<std::size_t>(grid.columns() * grid.rows()));
+    for (const Position& eye : eyes_for(grid, random, 6)) {
+      ViewshedEye from{eye, 0, {}};
+      from.limits.max_distance_m = 1100;
+      from.limits.min_pitch_rad = -0.3;
+      from.limits.azimuth_begin_rad = 5;
+      from.limits.azimuth_end_rad = 4;
+      SweepCounts few, all;
+      together.lower(grid, {}, from, &few);
+      apart.add(heights_from(grid, {}, from, own_m, &all), own_m);
+      climbed += few.traced_part;
+      compared += all.traced_part;
+    }
+    for (std::size_t i = 0; i < own_m.size(); ++i) {
+      const float least = together.heights_m()[i], expected = apart.heights_m()[i];
+      ASSERT_TRUE(least == expected || (std::isnan(least) && std::isnan(expected)))
+          << "relief " << static_cast<int>(recipe.relief) << " sample " << i << ": " << least
+          << " instead of " << expected;
+    }
+  }
+  EXPECT_LT(climbed, compared * 3 / 4);
 }
 
 TEST(SweepViewshed, DecidesMostByItsBounds) {

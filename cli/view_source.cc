@@ -1,0 +1,132 @@
+#include "cli/view_source.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "core/error/error.h"
+#include "core/threads/parallel_for.h"
+#include "core/viewshed/tin_viewshed.h"
+#include "ingest/dem/ground_placement.h"
+
+namespace scarp {
+namespace {
+
+/// This much of a cell may be rounding in the headers of two files over the same cells.
+constexpr double kSameCells = 0.01;
+
+/// Do two CRSs put the raster's corners at the same places?
+bool same_crs(const Dem& a, const std::string& a_wkt, const std::string& b_wkt) {
+  if (a_wkt.empty() || b_wkt.empty() || a_wkt == b_wkt) return a_wkt == b_wkt;
+  for (const double column : {0.0, a.columns - 1.0}) {
+    for (const double row : {0.0, a.rows - 1.0}) {
+      const MapPoint from{a.x_of(column), a.y_of(row), 0};
+      const MapPoint to = convert_coordinates(b_wkt, a_wkt, from);
+      if (std::abs(to.x - from.x) > kSameCells * a.geotransform[1] ||
+          std::abs(to.y - from.y) > kSameCells * -a.geotransform[5])
+        return false;
+    }
+  }
+  return true;
+}
+
+bool same_cells(const Dem& a, const Dem& b) {
+  if (a.columns != b.columns || a.rows != b.rows) return false;
+  const auto near = [&](std::size_t i, double cell) {
+    return std::abs(a.geotransform[i] - b.geotransform[i]) < kSameCells * std::abs(cell);
+  };
+  const double width = a.geotransform[1], height = a.geotransform[5];
+  return near(0, width) && near(3, height) && near(1, width / a.columns) &&
+         near(5, height / a.rows);
+}
+
+}  // namespace
+
+ViewSource::ViewSource(const std::vector<std::string>& sources,
+                       const std::vector<std::string>& obstacles, const DemOptions& options,
+                       const Progress& progress) {
+  if (const std::string* scene = scene_among(sources, options)) {
+    if (!obstacles.empty())
+      throw Error(ErrorCode::kUsage,
+                  fmt::format("'{}': is a scene, whose surface blocks; leave --obstacles out, or "
+                              "name the terrain model instead",
+                              *scene));
+    scene_.emplace(*scene);
+    stand_on_scene();
+    return;
+  }
+  ground_ = read_ground(sources, options, progress);
+  if (!obstacles.empty()) read_obstacles(obstacles, options);
+}
+
+void ViewSource::stand_on_scene() {
+  const SceneDescription& description = scene_->scene.description();
+  Dem& dem = ground_.dem;
+  dem.columns = description.raster.columns;
+  dem.rows = description.raster.rows;
+  dem.geotransform = description.raster.geotransform;
+  dem.frame = std::make_shared<const GeoFrame>(frame_of(description));
+  dem.height_unit = std::string("m");
+  ground_.grid = GroundGrid(dem.columns, dem.rows, ground_placement(dem));
+  stand_on(scene_->index, ground_.grid);
+}
+
+void ViewSource::read_obstacles(const std::vector<std::string>& files, const DemOptions& options) {
+  Ground read = read_ground(files, options, {});
+  if (!same_cells(ground_.dem, read.dem))
+    throw Error(
+        ErrorCode::kInput,
+        fmt::format("'{}': has {} x {} cells from {:.10g},{:.10g}; those of the terrain "
+                    "model were expected, {} x {} from {:.10g},{:.10g}; warp it with "
+                    "gdalwarp -te -ts",
+                    files.front(), read.dem.columns, read.dem.rows, read.dem.geotransform[0],
+                    read.dem.geotransform[3], ground_.dem.columns, ground_.dem.rows,
+                    ground_.dem.geotransform[0], ground_.dem.geotransform[3]));
+  if (!same_crs(ground_.dem, ground_.dem.frame->description().crs_wkt,
+                read.dem.frame->description().crs_wkt))
+    throw Error(ErrorCode::kInput,
+                fmt::format("'{}': has another coordinate system than the terrain model; the same "
+                            "one was expected; warp it with gdalwarp -t_srs",
+                            files.front()));
+  // Headers may differ by rounding; both grids have the placement of the terrain model.
+  obstacles_.emplace(ground_.dem.columns, ground_.dem.rows, ground_.grid.placement());
+  GroundGrid& samples = ground_.grid;
+  parallel_for(static_cast<std::size_t>(samples.rows()), [&](std::size_t r) {
+    const auto row = static_cast<std::int32_t>(r);
+    for (std::int32_t column = 0; column < samples.columns(); ++column) {
+      if (samples.is_known(column, row) && read.grid.is_known(column, row))
+        obstacles_->set_z(column, row, read.grid.at(column, row).z_m);
+      else
+        samples.set_void(column, row);
+    }
+  });
+  for (const std::string& warning : read.dem.warnings) ground_.dem.warnings.push_back(warning);
+}
+
+ViewGround ViewSource::ground() const {
+  if (scene_) return ViewGround::of_tin(samples(), scene_->index);
+  if (obstacles_) return ViewGround::under(samples(), *obstacles_);
+  return samples();
+}
+
+GroundEye ViewSource::place(const TypedPosition& typed, const std::string& crs) const {
+  if (!scene_) return place_eye(typed, crs, ground_);
+  GroundEye eye;
+  eye.map = resolve(typed, crs, *dem().frame, scene_->index);
+  eye.position = GeoFrame::Placer(*dem().frame).place(eye.map);
+  return eye;
+}
+
+GroundEye ViewSource::place(const MapPoint& point, bool above_datum,
+                            const std::string& text) const {
+  if (!scene_) return place_eye(point, above_datum, text, ground_);
+  TypedPosition typed;
+  typed.x = point.x;
+  typed.y = point.y;
+  typed.height_m = point.height_m;
+  typed.above_datum = above_datum;
+  typed.text = text;
+  return place(typed, std::string());
+}
+
+}  // namespace scarp

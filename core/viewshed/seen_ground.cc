@@ -1,0 +1,82 @@
+#include "core/viewshed/seen_ground.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/occlusion/splitmix64.h"
+#include "core/threads/parallel_for.h"
+
+namespace scarp {
+
+std::vector<SamplePlace> choose_samples(const GroundGrid& grid, std::uint64_t count,
+                                        std::uint64_t seed) {
+  std::uint64_t left = 0;
+  for (std::int32_t row = 0; row < grid.rows(); ++row)
+    for (std::int32_t column = 0; column < grid.columns(); ++column)
+      left += grid.is_known(column, row) ? 1 : 0;
+  std::uint64_t wanted = std::min(count, left);
+  std::vector<SamplePlace> chosen;
+  chosen.reserve(wanted);
+  SplitMix64 random(seed);
+  for (std::int32_t row = 0; row < grid.rows(); ++row) {
+    for (std::int32_t column = 0; column < grid.columns(); ++column) {
+      if (!grid.is_known(column, row)) continue;
+      if (random.below(left--) >= wanted) continue;
+      chosen.push_back({column, row});
+      --wanted;
+    }
+  }
+  return chosen;
+}
+
+double cell_area_m2(const GroundGrid& grid, const std::optional<EarthFrame>& earth,
+                    const SamplePlace& place) {
+  // Half a cell to each side; at the border the cell inwards of it.
+  const double column = std::clamp(place.column + 0.0, 0.5, grid.columns() - 1.5);
+  const double row = std::clamp(place.row + 0.0, 0.5, grid.rows() - 1.5);
+  struct Vector {
+    double x, y, z;
+  };
+  const auto at = [&](double right, double down) {
+    const Position p = grid.place(column + right, row + down, 0);
+    if (!earth) return Vector{p.x_m, p.y_m, 0};
+    const EcefPoint e = earth->frame.unflatten(p);
+    return Vector{e.x_m, e.y_m, e.z_m};
+  };
+  const Vector nw = at(-0.5, -0.5), ne = at(0.5, -0.5), sw = at(-0.5, 0.5), se = at(0.5, 0.5);
+  // A quadrangle's area is half the product of its diagonals across each other.
+  const Vector a{se.x - nw.x, se.y - nw.y, se.z - nw.z}, b{sw.x - ne.x, sw.y - ne.y, sw.z - ne.z};
+  return std::hypot(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x) / 2;
+}
+
+SeenGround::SeenGround(const GroundGrid& grid)
+    : columns_(static_cast<std::size_t>(grid.columns())),
+      area_m2_(columns_ * static_cast<std::size_t>(grid.rows()), 0) {
+  for (std::int32_t row = 0; row < grid.rows(); ++row)
+    for (std::int32_t column = 0; column < grid.columns(); ++column)
+      if (!grid.is_known(column, row))
+        area_m2_[static_cast<std::size_t>(row) * columns_ + static_cast<std::size_t>(column)] =
+            std::numeric_limits<double>::quiet_NaN();
+}
+
+void SeenGround::add(const SampleWindow& window, std::span<const Seen> sight, double area_m2) {
+  if (window.last_row < window.first_row || window.last_column < window.first_column) return;
+  parallel_for(
+      static_cast<std::size_t>(window.last_row - window.first_row + 1), [&](std::size_t r) {
+        const std::size_t begin = (static_cast<std::size_t>(window.first_row) + r) * columns_;
+        for (std::size_t i = begin + static_cast<std::size_t>(window.first_column);
+             i <= begin + static_cast<std::size_t>(window.last_column); ++i)
+          if (sight[i] == Seen::kVisible) area_m2_[i] += area_m2;
+      });
+}
+
+std::vector<float> SeenGround::areas_km2(double share) const {
+  std::vector<float> areas(area_m2_.size());
+  constexpr double kM2PerKm2 = 1e6;
+  std::transform(area_m2_.begin(), area_m2_.end(), areas.begin(),
+                 [&](double m2) { return static_cast<float>(m2 / share / kM2PerKm2); });
+  return areas;
+}
+
+}  // namespace scarp
