@@ -1,0 +1,103 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace scarp {
+
+/// The loops of a march over plain arrays: kBundle rays of neighbouring cells side by side, in
+/// groups of kGroup. Each is written once; the compiler makes vectors of it for several instruction
+/// sets, and the processor chooses at run time. Every operation is rounded by itself and the only
+/// reductions are maxima, so that all of them give the same bits.
+inline constexpr std::int32_t kBundle = 64, kGroup = 16, kGroups = kBundle / kGroup;
+
+/// Rays of neighbouring cells and what is known of their horizons, as slopes.
+struct RayBundle {
+  static constexpr float kNone = -1e15F;  ///< slopes below are of no ground at all
+
+  alignas(64) float eye_z[kBundle];
+  alignas(64) float low[kBundle];   ///< never above the horizon
+  alignas(64) float high[kBundle];  ///< never below what was compared exactly
+  alignas(64) float rest[kBundle];  ///< never below what was left out
+  alignas(64) float run[kBundle];   ///< where `high` was met, metres; only with distances
+  alignas(64) std::uint8_t over_void[kBundle];    ///< void met so far
+  alignas(64) std::uint8_t void_before[kBundle];  ///< ... with known ground behind
+};
+
+/// A grid segment from a to b, which the rays of a bundle cross at `share` of it, the i-th ray at
+/// share + i share_step, all strictly inside.
+struct Crossing {
+  const float* a;  ///< of the bundle's first lane
+  const float* b;
+  float share, share_step;
+  float inverse_run, inverse_run_step;  ///< 1 / metres, of the first ray and from ray to ray
+  float slack;                          ///< share's error times inverse_run
+  float drift;                          ///< relative error of the run
+};
+
+/// Compares rays with segments: low and high rise to the slopes at which the ground is seen.
+/// @param groups  bit g: the rays of group g take part
+void meet(const Crossing* crossings, std::size_t count, unsigned groups, RayBundle& rays);
+
+/// The same and notes in `run` where high is met. Cost: 1.5 times as much.
+void meet_and_measure(const Crossing* crossings, std::size_t count, unsigned groups,
+                      RayBundle& rays);
+
+/// A segment that the rays of one group may cross, at a share known within `reach` or not at all.
+struct PossibleCrossing {
+  const float* a;  ///< of the bundle's first lane
+  const float* b;
+  float share, share_step, reach;
+  float inverse_near, inverse_far;  ///< 1 / metres, bounds
+};
+/// Raises high only.
+void meet_high(const PossibleCrossing& crossing, int group, RayBundle& rays);
+
+/// Some rays meet a line near its samples, or not all in the same segment.
+struct LooseCrossing {
+  int first_ray, end_ray;
+  const float* z;           ///< sample at or before the first ray's place; the next two are used
+  float place, place_step;  ///< lanes from there, growing from ray to ray; in [reach, 2 - reach]
+  float reach;              ///< the place's error, lanes
+  float inverse_run;        ///< 1 / metres
+};
+void meet_loosely(const LooseCrossing& crossing, RayBundle& rays);
+
+/// Notes void on segments and known ground behind it. Call in order along the rays.
+void note_void(const float* a, const float* b, unsigned groups, RayBundle& rays);
+void note_void_loosely(const LooseCrossing& crossing, RayBundle& rays);
+
+/// Ground that is no higher than the greatest of some heights, within a range of distances.
+struct Square {
+  const float* highest[8];  ///< of the bundle's first lane
+  int count;
+  float inverse_near, inverse_far;
+};
+
+/// Which groups have a ray that the ground might block more than `tolerance` above its low? The
+/// others' `rest` rises to what the ground can do.
+/// @param groups  that are asked
+unsigned may_block(const Square& square, float tolerance, unsigned groups, RayBundle& rays);
+
+/// Rays that have met void see known ground in the square.
+void note_ground_behind(const Square& square, unsigned groups, RayBundle& rays);
+
+/// Final slopes' tangents of elevation.
+struct ElevationRow {
+  float level, level_step;  ///< of the first ray, and from ray to ray
+  float rise, rise_step;
+  float level_z, rise_z;  ///< per metre of the eye's z
+  float bend;
+  float shrink, shrink_step;  ///< slopes are multiplied by shrink + i shrink_step
+  float error;                ///< tangent_error
+  float slope_error;          ///< of the heights' rounding
+};
+
+/// Elevation in steps of 0.01 degree from slopes, rounded down and up.
+/// @param count  rays, at most kBundle
+/// Where no ground was met: kNothingSeen in all three.
+inline constexpr std::int16_t kNothingSeen = -9000, kUnknownElevation = -32768;
+void elevations(const ElevationRow& row, const RayBundle& rays, std::int16_t* estimate,
+                std::int16_t* lower, std::int16_t* upper);
+
+}  // namespace scarp

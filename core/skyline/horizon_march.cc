@@ -1,0 +1,413 @@
+#include "core/skyline/horizon_march.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/skyline/crossing_kernels.h"
+
+namespace scarp {
+namespace {
+
+/// Lines that every ray crosses one by one; then squares take over.
+constexpr std::int32_t kNearLines = 24;
+
+/// Squares are at most this share of their distance.
+constexpr std::int32_t kDistanceInSquares = 8;
+
+constexpr unsigned kAllGroups = (1U << kGroups) - 1;
+
+/// Places this near to a sample are looked at with both of its segments, lanes.
+constexpr double kNearSample = 1e-6;
+
+/// One bundle of rays on its way.
+class BundleMarch {
+ public:
+  BundleMarch(const MarchGround& ground, const RayFan& fan, const MarchTile& tile,
+              const MarchSearch& search)
+      : ground_(ground),
+        fan_(fan),
+        tile_(tile),
+        search_(search),
+        exact_(fan.slack_fixed == 0 && fan.slack_rate == 0) {}
+
+  /// Requires rays with eyes, from a lane on.
+  void run(std::int32_t lane, std::int32_t line, RayBundle& rays) {
+    lane_ = lane;
+    line_ = line;
+    rays_ = &rays;
+    const double p = lane - tile_.first_lane - (tile_.lanes - 1) / 2.0;
+    const double q = line - tile_.first_line - (tile_.lines - 1) / 2.0;
+    turn_ = fan_.turn.at(p, q);
+    reach_ = std::min(fan_.reach(), fan_.line_step > 0 ? ground_.lines() - 1 - line : line);
+    if (reach_ < 1) return;
+    notes_void_ = ground_.has_void();
+    const std::int32_t near = last_near_line();
+    cross_lines(1, near, kAllGroups);
+    list_squares(near + 1);
+    for (const Span& span : spans_) search_span(span, kAllGroups);
+  }
+
+ private:
+  /// Lines [first, last], counted from the rays' begins, that a row of squares holds.
+  struct Span {
+    int level;
+    std::int32_t block, first, last;
+  };
+
+  std::int32_t line_at(std::int32_t k) const { return line_ + fan_.line_step * k; }
+  /// Lanes from the begin of the bundle's first ray at the k-th line, and from ray to ray.
+  double place(std::int32_t k) const {
+    return fan_.place[static_cast<std::size_t>(k)] + k * turn_;
+  }
+  double place_step(std::int32_t k) const { return k * fan_.turn.per_lane; }
+  double inverse_run(std::int32_t k) const {
+    return fan_.inverse_run[static_cast<std::size_t>(k)];
+  }
+  /// Samples of a line by lane offset from the bundle's first ray.
+  const float* samples(std::int32_t k, std::int32_t offset) const {
+    return ground_.line(line_at(k)) + lane_ + offset;
+  }
+  bool is_off_grid(std::int32_t offset) const {
+    return lane_ + offset + kBundle < 0 || lane_ + offset > ground_.lanes() - 1;
+  }
+
+  /// Squares begin where blocks do.
+  std::int32_t last_near_line() const {
+    std::int32_t k = std::min(kNearLines, reach_);
+    while (k < reach_ && !begins_block(k + 1, MarchGround::kLeastLevel)) ++k;
+    return k;
+  }
+  bool begins_block(std::int32_t k, int level) const {
+    const std::int32_t line = line_at(k) + (fan_.line_step > 0 ? 0 : 1);
+    return (line & ((1 << level) - 1)) == 0;
+  }
+
+  void list_squares(std::int32_t first) {
+    spans_.clear();
+    int level = MarchGround::kLeastLevel;
+    for (std::int32_t k = first; k <= reach_;) {
+      while (level < ground_.greatest_level() && (kDistanceInSquares << (level + 1)) <= k &&
+             begins_block(k, level + 1))
+        ++level;
+      const Span span{level, line_at(k) >> level, k, std::min(k + (1 << level) - 1, reach_)};
+      const double at = place(k), end = at + place_step(k) * (kBundle - 1);
+      if (std::min(at, end) + lane_ > ground_.lanes() + kSwerveLanes ||
+          std::max(at, end) + lane_ + kBundle < -kSwerveLanes)
+        return;  // all rays have left the grid
+      notes_void_ = false;  // out of order here
+      cross_line(k, kAllGroups);
+      flush(kAllGroups);
+      notes_void_ = ground_.has_void();
+      spans_.push_back(span);
+      k = span.last + 1;
+    }
+  }
+
+  void search_span(const Span& span, unsigned groups) {
+    Square square;
+    unsigned open = groups;
+    if (!make_square(span, square)) return;
+    if (square.count > 0) {
+      open = may_block(square, search_.tolerance, groups, *rays_);
+      if (ground_.has_void()) open |= note_void_of(span, square, groups & ~open);
+    }
+    if (open == 0) return;
+    if (span.level == MarchGround::kLeastLevel) {
+      cross_lines(span.first, span.last, open);
+      return;
+    }
+    const std::int32_t middle = span.first + (1 << (span.level - 1));
+    const auto part = [&](std::int32_t first, std::int32_t last) {
+      search_span({span.level - 1, line_at(first) >> (span.level - 1), first, last}, open);
+    };
+    part(span.first, std::min(span.last, middle - 1));
+    if (middle <= span.last) part(middle, span.last);
+  }
+
+  /// The squares that hold all that the rays can meet within a span. Count 0: too many of them.
+  /// @return false where the rays meet nothing there
+  bool make_square(const Span& span, Square& square) const {
+    const std::int32_t before = span.first - 1, after = std::min(span.last + 1, fan_.reach());
+    double low = place(before), high = low;
+    for (const double at : {low + place_step(before) * (kBundle - 1), place(after),
+                            place(after) + place_step(after) * (kBundle - 1)}) {
+      low = std::min(low, at);
+      high = std::max(high, at);
+    }
+    const double half = (after - before) / 2.0;
+    const double slack = fan_.slack(after) + fan_.bulge * half * half + kNearSample;
+    const auto first = static_cast<std::int32_t>(std::floor(low - slack));
+    const auto last = static_cast<std::int32_t>(std::floor(high + slack)) + 1;
+    square.count = 0;
+    square.inverse_near = static_cast<float>(inverse_run(span.first));
+    square.inverse_far = static_cast<float>(inverse_run(span.last));
+    if (lane_ + last + kBundle < 0 || lane_ + first > ground_.lanes() - 1) return false;
+    const std::int32_t side = 1 << span.level;
+    const float* highest = ground_.highest(span.level, span.block);
+    int count = 0;
+    for (std::int32_t at = clamped(first);;) {
+      if (count == kMostSquares) return true;
+      square.highest[count++] = highest + lane_ + at;
+      if (at + side > last) break;
+      at = std::min(at + side, std::max(clamped(last - side + 1), at + 1));
+    }
+    square.count = count;
+    return true;
+  }
+
+  /// Lane offsets at which a bundle can be read.
+  std::int32_t clamped(std::int32_t offset) const {
+    return std::clamp(offset, -MarchGround::kPad - lane_,
+                      ground_.lanes() + MarchGround::kPad - kBundle - lane_);
+  }
+
+  /// Groups, of those that are not opened anyway, that must be because there is void.
+  unsigned note_void_of(const Span& span, const Square& square, unsigned groups) {
+    unsigned open = 0;
+    const std::uint8_t* any_void = ground_.any_void(span.level, span.block);
+    const float* highest = ground_.highest(span.level, span.block);
+    for (int g = 0; g < kGroups; ++g) {
+      bool found = false;
+      for (int i = 0; i < square.count; ++i)
+        for (int ray = g * kGroup; ray < (g + 1) * kGroup; ++ray)
+          found |= any_void[square.highest[i] - highest + ray] != 0 &&
+                   rays_->void_before[ray] == 0;
+      if (found) open |= 1U << g & groups;
+    }
+    note_ground_behind(square, groups & ~open, *rays_);
+    return open;
+  }
+
+  /// Crosses lines and what lies between them and their neighbours.
+  void cross_lines(std::int32_t first, std::int32_t last, unsigned groups) {
+    for (std::int32_t k = first; k <= last; ++k) {
+      cross_between(k, groups);
+      cross_line(k, groups);
+    }
+    if (last < reach_) cross_between(last + 1, groups);
+    flush(groups);
+  }
+
+  void cross_line(std::int32_t k, unsigned groups) {
+    const double at = place(k), step = place_step(k), slack = fan_.slack(k);
+    const double near = exact_ ? 0 : 2 * slack + kNearSample;
+    const double end = at + step * (kBundle - 1);
+    const double whole = std::floor(std::min(at, end));
+    const auto offset = static_cast<std::int32_t>(whole);
+    if (is_off_grid(offset)) return;
+    if (std::min(at, end) - whole >= near && std::max(at, end) - whole <= 1 - near) {
+      const float* a = samples(k, offset);
+      const bool on_samples = exact_ && at == whole;
+      add({a, on_samples ? a : a + 1, static_cast<float>(at - whole), static_cast<float>(step),
+           static_cast<float>(inverse_run(k)), 0, static_cast<float>(slack * inverse_run(k)), 0},
+          groups);
+      return;
+    }
+    flush(groups);
+    for (int g = 0; g < kGroups; ++g)
+      if ((groups >> g & 1) != 0) cross_loosely(k, g * kGroup, (g + 1) * kGroup);
+  }
+
+  /// Rays that meet a line near samples or in several segments.
+  void cross_loosely(std::int32_t k, int first_ray, int end_ray) {
+    const double step = place_step(k), at = place(k) + step * first_ray;
+    const double end = at + step * (end_ray - first_ray - 1);
+    const double reach = fan_.slack(k) + kNearSample / 4;
+    const double base = std::floor(std::min(at, end) - 2 * reach);
+    if (std::max(at, end) + 2 * reach > base + 2 && end_ray - first_ray > 1) {
+      const int middle = (first_ray + end_ray) / 2;
+      cross_loosely(k, first_ray, middle);
+      cross_loosely(k, middle, end_ray);
+      return;
+    }
+    const auto offset = static_cast<std::int32_t>(base);
+    if (is_off_grid(offset)) return;
+    const LooseCrossing crossing{first_ray,
+                                 end_ray,
+                                 samples(k, offset) + first_ray,
+                                 static_cast<float>(at - base),
+                                 static_cast<float>(step),
+                                 static_cast<float>(reach),
+                                 static_cast<float>(inverse_run(k))};
+    meet_loosely(crossing, *rays_);
+    if (notes_void_) note_void_loosely(crossing, *rays_);
+  }
+
+  /// Segments that join a line's samples to those of the line before.
+  void cross_between(std::int32_t k, unsigned groups) {
+    const double from = place(k - 1), to = place(k);
+    const double last_from = from + place_step(k - 1) * (kBundle - 1);
+    const double last_to = to + place_step(k) * (kBundle - 1);
+    const double along = to - from, last_along = last_to - last_from;
+    const double slack = fan_.slack(k);
+    constexpr double kParallel = 1e-9;
+    if (std::abs(along) < kParallel || along * last_along <= 0) {
+      if (!exact_) cross_parallel(k, groups);
+      return;
+    }
+    const auto [low, high] = std::minmax({from, last_from, to, last_to});
+    const auto first = static_cast<std::int32_t>(std::ceil(low - slack));
+    const auto last = static_cast<std::int32_t>(std::floor(high + slack));
+    const double bent = (last_along - along) / along;
+    const double reach = std::min(1.0, slack / std::abs(along) + bent * bent / 4);
+    const double near = 2 * reach + kNearSample;
+    for (std::int32_t j = first; j <= last; ++j) {
+      // The cell's own column at the begin of its ray.
+      if ((k == 1 && j == 0) || is_off_grid(j)) continue;
+      const double at = (j - from) / along, end = (j - last_from) / last_along;
+      if (std::max(at, end) < -reach || std::min(at, end) > 1 + reach) continue;
+      const float* a = samples(k - 1, j);
+      const float* b = samples(k, j);
+      const double least = std::min(at, end), most = std::max(at, end);
+      if (least >= near && most <= 1 - near && reach <= kSureReach) {
+        const double inverse = 1 / run_at(k - 1 + at), last_inverse = 1 / run_at(k - 1 + end);
+        add({a, b, static_cast<float>(at), static_cast<float>((end - at) / (kBundle - 1)),
+             static_cast<float>(inverse),
+             static_cast<float>((last_inverse - inverse) / (kBundle - 1)),
+             static_cast<float>(reach * inverse), static_cast<float>(reach / (k - 1 + least))},
+            groups);
+      } else if (reach <= kSureReach) {
+        add_possible({a, b, static_cast<float>(at), static_cast<float>((end - at) / (kBundle - 1)),
+                      static_cast<float>(reach),
+                      static_cast<float>(1 / run_at(k - 1 + std::max(least - reach, 0.0))),
+                      static_cast<float>(1 / run_at(k - 1 + std::min(most + reach, 1.0)))},
+                     groups);
+      } else {
+        add_either_end(k, a, b, groups);
+      }
+    }
+  }
+
+  /// Rays along a column of samples, for all that is known.
+  void cross_parallel(std::int32_t k, unsigned groups) {
+    const double slack = fan_.slack(k);
+    const double at = place(k), end = at + place_step(k) * (kBundle - 1);
+    const auto first = static_cast<std::int32_t>(std::ceil(std::min(at, end) - slack));
+    for (std::int32_t j = first; j <= std::max(at, end) + slack; ++j)
+      if (!(k == 1 && j == 0) && !is_off_grid(j))
+        add_either_end(k, samples(k - 1, j), samples(k, j), groups);
+  }
+
+  /// A segment that may be crossed anywhere: no place on it is seen higher than both of its ends.
+  void add_either_end(std::int32_t k, const float* a, const float* b, unsigned groups) {
+    const auto inverse = static_cast<float>(inverse_run(k));
+    add_possible({a, b, 1, 0, 0, inverse, inverse}, groups);
+    if (k == 1) return;
+    const auto before = static_cast<float>(inverse_run(k - 1));
+    add_possible({a, b, 0, 0, 0, before, before}, groups);
+  }
+
+  /// Metres to a place between two lines.
+  double run_at(double k) const {
+    const auto before = static_cast<std::int32_t>(std::clamp(k, 0.0, fan_.reach() - 1.0));
+    const double from = before == 0 ? 0 : 1 / inverse_run(before);
+    const double step = 1 / inverse_run(before + 1) - from;
+    constexpr double kLeastShare = 0.01;  // of a line: nothing is met nearer
+    return std::max(from + (k - before) * step, kLeastShare * step);
+  }
+
+  void add(const Crossing& crossing, unsigned groups) {
+    if (notes_void_) note_void(crossing.a, crossing.b, groups, *rays_);
+    crossings_[count_++] = crossing;
+    if (count_ == crossings_.size()) flush(groups);
+  }
+  void flush(unsigned groups) {
+    if (search_.measures_distance)
+      meet_and_measure(crossings_.data(), count_, groups, *rays_);
+    else
+      meet(crossings_.data(), count_, groups, *rays_);
+    count_ = 0;
+  }
+  void add_possible(const PossibleCrossing& crossing, unsigned groups) {
+    if (notes_void_) note_void(crossing.a, crossing.b, groups, *rays_);
+    for (int g = 0; g < kGroups; ++g)
+      if ((groups >> g & 1) != 0) meet_high(crossing, g, *rays_);
+  }
+
+  static constexpr int kMostSquares = 8;
+  static constexpr double kSwerveLanes = 64;
+  static constexpr double kSureReach = 0.05;
+
+  const MarchGround& ground_;
+  const RayFan& fan_;
+  const MarchTile& tile_;
+  const MarchSearch& search_;
+  const bool exact_;
+  std::int32_t lane_ = 0, line_ = 0, reach_ = 0;
+  double turn_ = 0;
+  RayBundle* rays_ = nullptr;
+  std::vector<Span> spans_;
+  std::array<Crossing, 64> crossings_;
+  std::size_t count_ = 0;
+  bool notes_void_ = false;
+};
+
+/// Eyes over a line's samples; rays without one take no part.
+void place_eyes(const GroundGrid& grid, const MarchGround& ground, std::int32_t lane,
+                std::int32_t line, double height_m, RayBundle& rays) {
+  const float* z = ground.line(line) + lane;
+  for (int i = 0; i < kBundle; ++i) {
+    const bool known = lane + i < ground.lanes() && MarchGround::is_ground(z[i]);
+    rays.eye_z[i] = known ? z[i] : 0;
+    if (known && height_m > 0) {
+      const bool rows = ground.march() == March::kOverRows;
+      const double raised_z_m = grid.raised(rows ? lane + i : line, rows ? line : lane + i, height_m).z_m;
+      rays.eye_z[i] = static_cast<float>(raised_z_m - ground.middle_z_m());
+    }
+    rays.low[i] = known ? MarchGround::kNothing : -MarchGround::kNothing;
+    rays.high[i] = rays.rest[i] = rays.low[i];
+    rays.run[i] = 0;
+    rays.over_void[i] = 0;
+    rays.void_before[i] = known ? 0 : 1;
+  }
+}
+
+}  // namespace
+
+void march_tile(const GroundGrid& grid, const MarchGround& ground, const RayFan& fan,
+                const MarchTile& tile, const MarchSearch& search, TileHorizons& horizons) {
+  const auto lanes = static_cast<std::size_t>(tile.lanes);
+  const std::size_t cells = lanes * static_cast<std::size_t>(tile.lines);
+  horizons.estimate.resize(cells);
+  horizons.lower.resize(cells);
+  horizons.upper.resize(cells);
+  if (search.measures_distance) horizons.run_m.resize(cells);
+  BundleMarch march(ground, fan, tile, search);
+  RayBundle rays;
+  std::array<std::int16_t, kBundle> estimate, lower, upper;
+  for (std::int32_t line = tile.first_line; line < tile.first_line + tile.lines; ++line) {
+    const double q = line - tile.first_line - (tile.lines - 1) / 2.0;
+    for (std::int32_t i = 0; i < tile.lanes; i += kBundle) {
+      const double p = i - (tile.lanes - 1) / 2.0;
+      place_eyes(grid, ground, tile.first_lane + i, line, search.eye_height_m, rays);
+      march.run(tile.first_lane + i, line, rays);
+      const double level =
+          fan.level.at(p, q) + fan.level_z * (ground.middle_z_m() - fan.middle_z_m);
+      const double rise = fan.rise.at(p, q) + fan.rise_z * (ground.middle_z_m() - fan.middle_z_m);
+      const double shrink = 1 / fan.stretch.at(p, q);
+      const ElevationRow row{static_cast<float>(level),
+                             static_cast<float>(fan.level.per_lane),
+                             static_cast<float>(rise),
+                             static_cast<float>(fan.rise.per_lane),
+                             static_cast<float>(fan.level_z),
+                             static_cast<float>(fan.rise_z),
+                             static_cast<float>(fan.bend),
+                             static_cast<float>(shrink),
+                             static_cast<float>(-fan.stretch.per_lane * shrink * shrink),
+                             static_cast<float>(fan.tangent_error),
+                             static_cast<float>(4 * ground.rounding_m() *
+                                                (fan.reach() > 0 ? fan.inverse_run[1] : 0))};
+      elevations(row, rays, estimate.data(), lower.data(), upper.data());
+      const auto count = static_cast<std::ptrdiff_t>(std::min(kBundle, tile.lanes - i));
+      const std::size_t to = static_cast<std::size_t>(line - tile.first_line) * lanes +
+                             static_cast<std::size_t>(i);
+      std::copy_n(estimate.begin(), count, &horizons.estimate[to]);
+      std::copy_n(lower.begin(), count, &horizons.lower[to]);
+      std::copy_n(upper.begin(), count, &horizons.upper[to]);
+      if (search.measures_distance) std::copy_n(rays.run, count, &horizons.run_m[to]);
+    }
+  }
+}
+
+}  // namespace scarp
