@@ -21,13 +21,13 @@ EcefPoint sun_direction(double days) {
                             0.000289 * std::sin(3 * anomaly);
   const double node = (125.04 - 1934.136 * t) * kRadiansPerDegree;
   // With aberration and nutation, of the date.
-  const double longitude = (mean_longitude_deg + centre_deg - 0.00569 - 0.00478 * std::sin(node)) *
-                           kRadiansPerDegree;
+  const double longitude =
+      (mean_longitude_deg + centre_deg - 0.00569 - 0.00478 * std::sin(node)) * kRadiansPerDegree;
   const double obliquity = (23.43929111 - t * (0.0130041667 + t * (1.6389e-7 - t * 5.0361e-7)) +
                             0.00256 * std::cos(node)) *
                            kRadiansPerDegree;
-  const double ascension = std::atan2(std::cos(obliquity) * std::sin(longitude),
-                                      std::cos(longitude));
+  const double ascension =
+      std::atan2(std::cos(obliquity) * std::sin(longitude), std::cos(longitude));
   const double declination = std::asin(std::sin(obliquity) * std::sin(longitude));
   // Mean sidereal time at Greenwich turns the sky.
   const double turns = std::fmod(280.46061837 + 360.98564736629 * days, 360.0);

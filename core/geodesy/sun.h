@@ -11,10 +11,9 @@ namespace scarp {
 /// Source: Meeus, Astronomical Algorithms (1998), chapters 12 and 25, low accuracy.
 EcefPoint sun_direction(double days);
 
-/// Elevation at which air shows what is at a true elevation, radians both: at 10 degrees Celsius and
-/// 1010 hPa. Below -1 degree nothing is added.
-/// Accuracy: 0.002 degree above 5 degrees; near the horizon weather matters more.
-/// Source: Saemundsson 1986 (Meeus, formula 16.4).
+/// Elevation at which air shows what is at a true elevation, radians both: at 10 degrees Celsius
+/// and 1010 hPa. Below -1 degree nothing is added. Accuracy: 0.002 degree above 5 degrees; near the
+/// horizon weather matters more. Source: Saemundsson 1986 (Meeus, formula 16.4).
 double refracted_elevation_rad(double true_elevation_rad);
 
 }  // namespace scarp

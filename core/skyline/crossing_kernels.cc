@@ -1,130 +1,278 @@
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/skyline/crossing_kernels.cc"
+#include <hwy/foreach_target.h>
+// After foreach_target.h, which includes this file once more for each instruction set.
+#include <hwy/highway.h>
+
 #include "core/skyline/crossing_kernels.h"
-
-#include <cstring>
-
 #include "core/skyline/march_ground.h"
-#include "core/threads/for_each_target.h"
 
+HWY_BEFORE_NAMESPACE();
 namespace scarp {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// As many rays at once as the processor takes, but never more than a group.
+using Tag = hn::CappedTag<float, kGroup>;
+using Vector = hn::Vec<Tag>;
+using Mask = hn::Mask<Tag>;
+constexpr Tag kTag;
+constexpr float kGroundBound = -1e29F;
+
+HWY_INLINE Vector value(float v) {
+  return hn::Set(kTag, v);
+}
+HWY_INLINE bool takes_part(unsigned groups, std::size_t ray) {
+  return (groups >> (ray / kGroup) & 1) != 0;
+}
+
+void meet_now(const Crossing* crossings, std::size_t count, unsigned groups, RayBundle& rays) {
+  for (std::size_t ray = 0; ray < kBundle; ray += hn::Lanes(kTag)) {
+    if (!takes_part(groups, ray)) continue;
+    Vector low = hn::Load(kTag, rays.low + ray), high = hn::Load(kTag, rays.high + ray);
+    const Vector eye = hn::Load(kTag, rays.eye_z + ray);
+    const Vector number = hn::Iota(kTag, static_cast<float>(ray));
+    for (std::size_t i = 0; i < count; ++i) {
+      const Crossing& c = crossings[i];
+      const Vector a = hn::LoadU(kTag, c.a + ray), difference = hn::LoadU(kTag, c.b + ray) - a;
+      const Vector share = value(c.share) + value(c.share_step) * number;
+      const Vector inverse = value(c.inverse_run) + value(c.inverse_run_step) * number;
+      const Vector slope = ((a - eye) + share * difference) * inverse;
+      const Vector error = hn::Abs(difference) * value(c.slack) + hn::Abs(slope) * value(c.drift);
+      low = hn::Max(low, slope - error);
+      high = hn::Max(high, slope + error);
+    }
+    hn::Store(low, kTag, rays.low + ray);
+    hn::Store(high, kTag, rays.high + ray);
+  }
+}
+
+void meet_and_measure_now(const Crossing* crossings, std::size_t count, unsigned groups,
+                          RayBundle& rays) {
+  for (std::size_t ray = 0; ray < kBundle; ray += hn::Lanes(kTag)) {
+    if (!takes_part(groups, ray)) continue;
+    Vector low = hn::Load(kTag, rays.low + ray), high = hn::Load(kTag, rays.high + ray);
+    Vector run = hn::Load(kTag, rays.run + ray);
+    const Vector eye = hn::Load(kTag, rays.eye_z + ray);
+    const Vector number = hn::Iota(kTag, static_cast<float>(ray));
+    for (std::size_t i = 0; i < count; ++i) {
+      const Crossing& c = crossings[i];
+      const Vector a = hn::LoadU(kTag, c.a + ray), difference = hn::LoadU(kTag, c.b + ray) - a;
+      const Vector share = value(c.share) + value(c.share_step) * number;
+      const Vector inverse = value(c.inverse_run) + value(c.inverse_run_step) * number;
+      const Vector slope = ((a - eye) + share * difference) * inverse;
+      const Vector error = hn::Abs(difference) * value(c.slack) + hn::Abs(slope) * value(c.drift);
+      run = hn::IfThenElse(high < slope + error, value(1 / c.inverse_run), run);
+      low = hn::Max(low, slope - error);
+      high = hn::Max(high, slope + error);
+    }
+    hn::Store(run, kTag, rays.run + ray);
+    hn::Store(low, kTag, rays.low + ray);
+    hn::Store(high, kTag, rays.high + ray);
+  }
+}
+
+void meet_high_now(const PossibleCrossing& c, unsigned groups, RayBundle& rays) {
+  const Vector none = value(MarchGround::kNothing), bound = value(kGroundBound);
+  for (std::size_t ray = 0; ray < kBundle; ray += hn::Lanes(kTag)) {
+    if (!takes_part(groups, ray)) continue;
+    const Vector number = hn::Iota(kTag, static_cast<float>(ray));
+    const Vector a = hn::LoadU(kTag, c.a + ray), b = hn::LoadU(kTag, c.b + ray);
+    const Vector difference = b - a;
+    const Mask known = hn::And(a > bound, b > bound);
+    const Vector reach =
+        hn::IfThenElse(difference < hn::Zero(kTag), value(-c.reach), value(c.reach));
+    const Vector share = value(c.share) + value(c.share_step) * number + reach;
+    const Vector inside = hn::Min(hn::Max(share, hn::Zero(kTag)), value(1));
+    const Vector rise = (a - hn::Load(kTag, rays.eye_z + ray)) + inside * difference;
+    const Vector slope =
+        rise * hn::IfThenElse(rise < hn::Zero(kTag), value(c.inverse_far), value(c.inverse_near));
+    const Vector most = hn::IfThenElse(known, slope, none);
+    const Vector high = hn::Load(kTag, rays.high + ray);
+    hn::Store(hn::IfThenElse(high < most, value(2 / (c.inverse_near + c.inverse_far)),
+                             hn::Load(kTag, rays.run + ray)),
+              kTag, rays.run + ray);
+    hn::Store(hn::Max(high, most), kTag, rays.high + ray);
+  }
+}
+
+void meet_loosely_now(const LooseCrossing& c, RayBundle& rays) {
+  const Vector none = value(MarchGround::kNothing), bound = value(kGroundBound);
+  const Vector zero = hn::Zero(kTag);
+  const std::size_t lanes = hn::Lanes(kTag);
+  const auto end = static_cast<std::size_t>(c.end_ray);
+  for (std::size_t ray = static_cast<std::size_t>(c.first_ray) / lanes * lanes; ray < end;
+       ray += lanes) {
+    const Vector number = hn::Iota(kTag, static_cast<float>(ray));
+    const Mask taken = hn::And(number >= value(static_cast<float>(c.first_ray)),
+                               number < value(static_cast<float>(c.end_ray)));
+    const Vector z0 = hn::LoadU(kTag, c.z + ray), z1 = hn::LoadU(kTag, c.z + ray + 1);
+    const Vector z2 = hn::LoadU(kTag, c.z + ray + 2);
+    const Vector past = value(c.place) + value(c.place_step) * number - value(1);
+    const Mask before = past < zero, near = hn::Abs(past) <= value(c.reach);
+    const Mask known = z1 > bound;
+    // Where a side is missing, its rise counts as none.
+    const Mask has_left = hn::And(known, z0 > bound), has_right = hn::And(known, z2 > bound);
+    const Vector left = hn::IfThenElseZero(has_left, z1 - z0);
+    const Vector right = hn::IfThenElseZero(has_right, z2 - z1);
+    const Vector one_side = hn::Abs(hn::IfThenElse(before, left, right));
+    const Vector steep = hn::IfThenElse(near, hn::Max(hn::Abs(left), hn::Abs(right)), one_side);
+    const Vector rise = hn::IfThenElse(before, left, right);
+    const Vector slope =
+        ((z1 - hn::Load(kTag, rays.eye_z + ray)) + past * rise) * value(c.inverse_run);
+    const Vector error = steep * value(c.reach * c.inverse_run);
+    const Mask has_side = hn::Or(hn::And(before, has_left), hn::AndNot(before, has_right));
+    // At the sample itself, the ray may pass on the side that is missing.
+    const Mask both = hn::And(has_left, has_right);
+    const Mask met = hn::And(taken, hn::Or(hn::And(near, both), hn::AndNot(near, has_side)));
+    const Mask may = hn::And(taken, hn::Or(hn::And(near, known), hn::AndNot(near, has_side)));
+    const Vector most = hn::IfThenElse(may, slope + error, none);
+    const Vector least = hn::IfThenElse(met, slope - error, none);
+    const Vector high = hn::Load(kTag, rays.high + ray);
+    hn::Store(hn::IfThenElse(high < most, value(1 / c.inverse_run), hn::Load(kTag, rays.run + ray)),
+              kTag, rays.run + ray);
+    hn::Store(hn::Max(hn::Load(kTag, rays.low + ray), least), kTag, rays.low + ray);
+    hn::Store(hn::Max(high, most), kTag, rays.high + ray);
+  }
+}
+
+unsigned may_block_now(const Square& square, float tolerance, unsigned groups, RayBundle& rays) {
+  unsigned open = 0;
+  alignas(64) float raised[kBundle];
+  const std::size_t lanes = hn::Lanes(kTag);
+  for (std::size_t ray = 0; ray < kBundle; ray += lanes) {
+    if (!takes_part(groups, ray)) continue;
+    Vector most = hn::LoadU(kTag, square.highest[0] + ray);
+    for (int i = 1; i < square.count; ++i)
+      most = hn::Max(most, hn::LoadU(kTag, square.highest[i] + ray));
+    const Vector rise = most - hn::Load(kTag, rays.eye_z + ray);
+    const Vector slope =
+        hn::Max(rise * value(square.inverse_near), rise * value(square.inverse_far));
+    const Vector least =
+        hn::Max(hn::Load(kTag, rays.low + ray) + value(tolerance), value(RayBundle::kNone));
+    hn::Store(hn::Max(hn::Load(kTag, rays.rest + ray), slope), kTag, raised + ray);
+    if (!hn::AllFalse(kTag, slope > least)) open |= 1U << (ray / kGroup);
+  }
+  for (std::size_t ray = 0; ray < kBundle; ray += lanes)
+    if (takes_part(groups & ~open, ray))
+      hn::Store(hn::Load(kTag, raised + ray), kTag, rays.rest + ray);
+  return open;
+}
+
+/// Arc tangent in steps of 0.01 degree, error below 0.004 of them.
+/// Source: Cephes atanf (Moshier), reduction at tan(pi/8) and tan(3 pi/8).
+HWY_INLINE Vector arc_tangent_steps(Vector x) {
+  const Vector t = hn::Abs(x), one = value(1);
+  const Mask large = t > value(2.414213562F), middle = t > value(0.4142135624F);
+  const Vector base =
+      hn::IfThenElse(large, value(1.5707963268F), hn::IfThenElseZero(middle, value(0.7853981634F)));
+  const Vector numerator = hn::IfThenElse(large, value(-1), hn::IfThenElse(middle, t - one, t));
+  const Vector denominator = hn::IfThenElse(large, t, hn::IfThenElse(middle, t + one, one));
+  const Vector r = numerator / denominator, z = r * r;
+  const Vector p =
+      (((value(8.05374449538e-2F) * z - value(1.38776856032e-1F)) * z + value(1.99777106478e-1F)) *
+           z -
+       value(3.33329491539e-1F)) *
+          z * r +
+      r;
+  return hn::CopySign((base + p) * value(5729.577951F), x);
+}
+
+void elevations_now(const ElevationRow& k, const RayBundle& rays, std::int16_t* estimate,
+                    std::int16_t* lower, std::int16_t* upper) {
+  constexpr float kRounding = 0.02F;  // of the steps: floats up to 9000, and the polynomial
+  // Slopes are steeper than the model is good for, and than makes a difference.
+  constexpr float kSteep = 4, kSteepAllowance = 5, kSteepest = 1e5F;
+  const Vector one = value(1), none = value(RayBundle::kNone);
+  const auto clamped = [](Vector v) {
+    return hn::Min(hn::Max(v, value(-kSteepest)), value(kSteepest));
+  };
+  const auto write = [](Vector v, std::int16_t* to) {
+    const hn::RebindToSigned<Tag> whole;
+    const hn::Rebind<std::int16_t, Tag> half;
+    hn::StoreU(hn::DemoteTo(half, hn::ConvertTo(whole, v)), half, to);
+  };
+  for (std::size_t i = 0; i < kBundle; i += hn::Lanes(kTag)) {
+    const Vector number = hn::Iota(kTag, static_cast<float>(i));
+    const Vector z = hn::Load(kTag, rays.eye_z + i);
+    const Vector level = value(k.level) + number * value(k.level_step) + z * value(k.level_z);
+    const Vector rise = value(k.rise) + number * value(k.rise_step) + z * value(k.rise_z);
+    const Vector shrink = value(k.shrink) + number * value(k.shrink_step);
+    const Vector ray_low = hn::Load(kTag, rays.low + i), ray_high = hn::Load(kTag, rays.high + i);
+    const Vector most = hn::Max(ray_high, hn::Load(kTag, rays.rest + i));
+    const Mask met = most > none, met_low = ray_low > none;
+    const Vector low = clamped(ray_low * shrink - value(k.slope_error));
+    const Vector high = clamped(most * shrink + value(k.slope_error));
+    const Vector middle =
+        clamped(hn::IfThenElse(met_low, (ray_low + ray_high) * value(0.5F), ray_high) * shrink);
+    const auto tangent = [&](Vector s) { return level + s * (rise + s * value(k.bend)); };
+    const Vector low_tangent = tangent(low) - value(k.error) * (one + low * low);
+    const Vector high_tangent = tangent(high) + value(k.error) * (one + high * high);
+    Vector least = hn::Floor(arc_tangent_steps(low_tangent) - value(kRounding));
+    Vector greatest = hn::Ceil(arc_tangent_steps(high_tangent) + value(kRounding));
+    least = hn::IfThenElse(hn::Abs(low) > value(kSteep), least - value(kSteepAllowance), least);
+    greatest =
+        hn::IfThenElse(hn::Abs(high) > value(kSteep), greatest + value(kSteepAllowance), greatest);
+    least = hn::IfThenElse(met_low, hn::Max(least, value(-9000)), value(-9000));
+    greatest = hn::Min(greatest, value(9000));
+    const Vector nearest = hn::Floor(arc_tangent_steps(tangent(middle)) + value(0.5F));
+    const Vector best = hn::Min(hn::Max(nearest, least), greatest);
+    const Vector nothing = value(kNothingSeen);
+    write(hn::IfThenElse(met, best, nothing), estimate + i);
+    write(hn::IfThenElse(met, least, nothing), lower + i);
+    write(hn::IfThenElse(met, greatest, nothing), upper + i);
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace scarp
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace scarp {
+
+HWY_EXPORT(meet_now);
+HWY_EXPORT(meet_and_measure_now);
+HWY_EXPORT(meet_high_now);
+HWY_EXPORT(meet_loosely_now);
+HWY_EXPORT(may_block_now);
+HWY_EXPORT(elevations_now);
+
 namespace {
 
-constexpr float kNothing = MarchGround::kNothing;
 constexpr float kGroundBound = -1e29F, kVoidBound = -1.5e30F;
-
-/// A group of rays as one value; the compiler lowers it to what the processor has.
-typedef float Lanes __attribute__((vector_size(kGroup * sizeof(float))));
-typedef float LooseLanes __attribute__((vector_size(kGroup * sizeof(float)), aligned(4)));
-
-constexpr Lanes kCount = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-
-inline float greater(float a, float b) {
-  return a < b ? b : a;
-}
-inline float magnitude(float a) {
-  return a < 0 ? -a : a;
-}
 
 }  // namespace
 
-SCARP_FOR_EACH_TARGET
 void meet(const Crossing* crossings, std::size_t count, unsigned groups, RayBundle& rays) {
-  for (int group = 0; group < kGroups; ++group) {
-    if ((groups >> group & 1) == 0) continue;
-    const std::ptrdiff_t first = group * kGroup;
-    Lanes low = *reinterpret_cast<const Lanes*>(rays.low + first);
-    Lanes high = *reinterpret_cast<const Lanes*>(rays.high + first);
-    const Lanes eye = *reinterpret_cast<const Lanes*>(rays.eye_z + first);
-    const Lanes number = kCount + static_cast<float>(first);
-    for (std::size_t i = 0; i < count; ++i) {
-      const Crossing& c = crossings[i];
-      const Lanes a = *reinterpret_cast<const LooseLanes*>(c.a + first);
-      const Lanes b = *reinterpret_cast<const LooseLanes*>(c.b + first);
-      const Lanes difference = b - a;
-      const Lanes share = c.share + c.share_step * number;
-      const Lanes inverse = c.inverse_run + c.inverse_run_step * number;
-      const Lanes slope = ((a - eye) + share * difference) * inverse;
-      const Lanes error = (difference < 0 ? -difference : difference) * c.slack +
-                          (slope < 0 ? -slope : slope) * c.drift;
-      const Lanes least = slope - error, most = slope + error;
-      low = low < least ? least : low;
-      high = high < most ? most : high;
-    }
-    *reinterpret_cast<Lanes*>(rays.low + first) = low;
-    *reinterpret_cast<Lanes*>(rays.high + first) = high;
-  }
+  HWY_DYNAMIC_DISPATCH(meet_now)(crossings, count, groups, rays);
 }
 
-SCARP_FOR_EACH_TARGET
 void meet_and_measure(const Crossing* crossings, std::size_t count, unsigned groups,
                       RayBundle& rays) {
-  for (std::size_t i = 0; i < count; ++i) {
-    const Crossing c = crossings[i];
-    const float run_m = 1 / c.inverse_run;
-    for (int lane = 0; lane < kBundle; ++lane) {
-      const bool taken = (groups >> (lane / kGroup) & 1) != 0;
-      const float a = c.a[lane], difference = c.b[lane] - a;
-      const float share = c.share + c.share_step * static_cast<float>(lane);
-      const float inverse = c.inverse_run + c.inverse_run_step * static_cast<float>(lane);
-      const float slope = ((a - rays.eye_z[lane]) + share * difference) * inverse;
-      const float error = magnitude(difference) * c.slack + magnitude(slope) * c.drift;
-      const float least = taken ? slope - error : kNothing, most = taken ? slope + error : kNothing;
-      rays.run[lane] = rays.high[lane] < most ? run_m : rays.run[lane];
-      rays.low[lane] = greater(rays.low[lane], least);
-      rays.high[lane] = greater(rays.high[lane], most);
-    }
-  }
+  HWY_DYNAMIC_DISPATCH(meet_and_measure_now)(crossings, count, groups, rays);
 }
 
-SCARP_FOR_EACH_TARGET
-void meet_high(const PossibleCrossing& crossing, int group, RayBundle& rays) {
-  const PossibleCrossing c = crossing;
-  const int first = group * kGroup;
-  const float run_m = 2 / (c.inverse_near + c.inverse_far);
-  for (int lane = first; lane < first + kGroup; ++lane) {
-    const float a = c.a[lane], difference = c.b[lane] - a;
-    const bool known = a > kGroundBound && c.b[lane] > kGroundBound;
-    float share = c.share + c.share_step * static_cast<float>(lane);
-    share = difference < 0 ? share - c.reach : share + c.reach;
-    share = share < 0 ? 0 : share;
-    share = share > 1 ? 1 : share;
-    const float rise = (a - rays.eye_z[lane]) + share * difference;
-    const float slope = rise * (rise < 0 ? c.inverse_far : c.inverse_near);
-    const float most = known ? slope : kNothing;
-    rays.run[lane] = rays.high[lane] < most ? run_m : rays.run[lane];
-    rays.high[lane] = greater(rays.high[lane], most);
-  }
+void meet_high(const PossibleCrossing& crossing, unsigned groups, RayBundle& rays) {
+  HWY_DYNAMIC_DISPATCH(meet_high_now)(crossing, groups, rays);
 }
 
-SCARP_FOR_EACH_TARGET
 void meet_loosely(const LooseCrossing& crossing, RayBundle& rays) {
-  const LooseCrossing c = crossing;
-  const float run_m = 1 / c.inverse_run;
-  for (int i = 0; i < c.end_ray - c.first_ray; ++i) {
-    const int lane = c.first_ray + i;
-    const float z0 = c.z[i], z1 = c.z[i + 1], z2 = c.z[i + 2];
-    const float place = c.place + static_cast<float>(i) * c.place_step;
-    const bool before = place < 1;
-    const bool near = magnitude(place - 1) <= c.reach;
-    const float left = z1 - z0, right = z2 - z1;
-    const bool has_left = z0 > kGroundBound && z1 > kGroundBound;
-    const bool has_right = z1 > kGroundBound && z2 > kGroundBound;
-    const float left_steep = has_left ? magnitude(left) : 0;
-    const float right_steep = has_right ? magnitude(right) : 0;
-    const float steep = near ? greater(left_steep, right_steep) : before ? left_steep : right_steep;
-    // At the sample itself where one side is missing: the ray may pass on the other.
-    const float past = (place - 1) * (before ? (has_left ? left : 0) : (has_right ? right : 0));
-    const float slope = ((z1 - rays.eye_z[lane]) + past) * c.inverse_run;
-    const float error = steep * c.reach * c.inverse_run;
-    const bool met = near ? has_left && has_right : before ? has_left : has_right;
-    const bool may = near ? z1 > kGroundBound : met;
-    const float most = may ? slope + error : kNothing;
-    rays.run[lane] = rays.high[lane] < most ? run_m : rays.run[lane];
-    rays.low[lane] = greater(rays.low[lane], met ? slope - error : kNothing);
-    rays.high[lane] = greater(rays.high[lane], most);
-  }
+  HWY_DYNAMIC_DISPATCH(meet_loosely_now)(crossing, rays);
 }
 
-SCARP_FOR_EACH_TARGET
+unsigned may_block(const Square& square, float tolerance, unsigned groups, RayBundle& rays) {
+  return HWY_DYNAMIC_DISPATCH(may_block_now)(square, tolerance, groups, rays);
+}
+
+void elevations(const ElevationRow& row, const RayBundle& rays, std::int16_t* estimate,
+                std::int16_t* lower, std::int16_t* upper) {
+  HWY_DYNAMIC_DISPATCH(elevations_now)(row, rays, estimate, lower, upper);
+  for (int i = 0; i < kBundle; ++i)
+    if (rays.void_before[i] != 0) estimate[i] = lower[i] = upper[i] = kUnknownElevation;
+}
+
 void note_void(const float* first, const float* second, unsigned groups, RayBundle& rays) {
   for (int lane = 0; lane < kBundle; ++lane) {
     const bool taken = (groups >> (lane / kGroup) & 1) != 0;
@@ -136,51 +284,19 @@ void note_void(const float* first, const float* second, unsigned groups, RayBund
   }
 }
 
-SCARP_FOR_EACH_TARGET
 void note_void_loosely(const LooseCrossing& crossing, RayBundle& rays) {
   const LooseCrossing c = crossing;
-  for (int i = 0; i < c.end_ray - c.first_ray; ++i) {
-    const int lane = c.first_ray + i;
-    const float place = c.place + static_cast<float>(i) * c.place_step;
-    const bool left = place < 1 + c.reach, right = place > 1 - c.reach;
-    const float z0 = c.z[i], z1 = c.z[i + 1], z2 = c.z[i + 2];
-    const bool is_void =
-        z1 < kVoidBound || (left && z0 < kVoidBound) || (right && z2 < kVoidBound);
+  for (int ray = c.first_ray; ray < c.end_ray; ++ray) {
+    const float place = c.place + static_cast<float>(ray) * c.place_step;
+    const bool left = place<1 + c.reach, right = place> 1 - c.reach;
+    const float z0 = c.z[ray], z1 = c.z[ray + 1], z2 = c.z[ray + 2];
+    const bool is_void = z1 < kVoidBound || (left && z0 < kVoidBound) || (right && z2 < kVoidBound);
     const bool known = z1 > kGroundBound && (left ? z0 > kGroundBound : z2 > kGroundBound);
-    rays.void_before[lane] = rays.void_before[lane] | (known ? rays.over_void[lane] : 0);
-    rays.over_void[lane] = rays.over_void[lane] | (is_void ? 1 : 0);
+    rays.void_before[ray] = rays.void_before[ray] | (known ? rays.over_void[ray] : 0);
+    rays.over_void[ray] = rays.over_void[ray] | (is_void ? 1 : 0);
   }
 }
 
-SCARP_FOR_EACH_TARGET
-unsigned may_block(const Square& square, float tolerance, unsigned groups, RayBundle& rays) {
-  unsigned open = 0;
-  for (int group = 0; group < kGroups; ++group) {
-    if ((groups >> group & 1) == 0) continue;
-    const std::ptrdiff_t first = group * kGroup;
-    Lanes most = *reinterpret_cast<const LooseLanes*>(square.highest[0] + first);
-    for (int i = 1; i < square.count; ++i) {
-      const Lanes more = *reinterpret_cast<const LooseLanes*>(square.highest[i] + first);
-      most = most < more ? more : most;
-    }
-    const Lanes rise = most - *reinterpret_cast<const Lanes*>(rays.eye_z + first);
-    const Lanes near = rise * square.inverse_near, far = rise * square.inverse_far;
-    const Lanes slope = near < far ? far : near;
-    const Lanes bound = *reinterpret_cast<const Lanes*>(rays.low + first) + tolerance;
-    const Lanes rest = *reinterpret_cast<const Lanes*>(rays.rest + first);
-    const Lanes raised = rest < slope ? slope : rest;
-    int blocked = 0;
-    const auto above = (slope > bound) & (slope > RayBundle::kNone);
-    for (int i = 0; i < kGroup; ++i) blocked |= above[i];
-    if (blocked != 0)
-      open |= 1U << group;
-    else
-      *reinterpret_cast<Lanes*>(rays.rest + first) = raised;
-  }
-  return open;
-}
-
-SCARP_FOR_EACH_TARGET
 void note_ground_behind(const Square& square, unsigned groups, RayBundle& rays) {
   for (int i = 0; i < square.count; ++i) {
     const float* highest = square.highest[i];
@@ -191,79 +307,5 @@ void note_ground_behind(const Square& square, unsigned groups, RayBundle& rays) 
   }
 }
 
-namespace {
-
-/// Arc tangent in steps of 0.01 degree, error below 0.004 of them.
-/// Source: Cephes atanf (Moshier), reduction at tan(pi/8) and tan(3 pi/8).
-inline float arc_tangent_steps(float x) {
-  const float t = magnitude(x);
-  const bool large = t > 2.414213562F, middle = t > 0.4142135624F;
-  const float y = large ? 1.5707963268F : middle ? 0.7853981634F : 0.0F;
-  const float numerator = large ? -1.0F : middle ? t - 1.0F : t;
-  const float denominator = large ? t : middle ? t + 1.0F : 1.0F;
-  const float r = numerator / denominator;
-  const float z = r * r;
-  const float p =
-      (((8.05374449538e-2F * z - 1.38776856032e-1F) * z + 1.99777106478e-1F) * z -
-       3.33329491539e-1F) *
-          z * r +
-      r;
-  const float steps = (y + p) * 5729.577951F;
-  return x < 0 ? -steps : steps;
-}
-
-/// Largest whole number not above x, for |x| below 2^22.
-inline float whole_below(float x) {
-  const auto cut = static_cast<float>(static_cast<std::int32_t>(x));
-  return cut > x ? cut - 1 : cut;
-}
-
-}  // namespace
-
-SCARP_FOR_EACH_TARGET
-void elevations(const ElevationRow& row, const RayBundle& rays, std::int16_t* __restrict estimate,
-                std::int16_t* __restrict lower, std::int16_t* __restrict upper) {
-  const ElevationRow k = row;
-  constexpr float kRounding = 0.02F;  // of the steps: floats up to 9000, and the polynomial
-  constexpr float kSteepest = 1e5F;   // beyond it is 90 degrees within a step
-  for (int i = 0; i < kBundle; ++i) {
-    const auto at = static_cast<float>(i);
-    const float z = rays.eye_z[i];
-    const float level = k.level + at * k.level_step + z * k.level_z;
-    const float rise = k.rise + at * k.rise_step + z * k.rise_z;
-    const float shrink = k.shrink + at * k.shrink_step;
-    float low = rays.low[i] * shrink - k.slope_error;
-    const bool met_low = rays.low[i] > RayBundle::kNone;
-    float middle = (met_low ? (rays.low[i] + rays.high[i]) * 0.5F
-                                               : rays.high[i]) *
-                   shrink;
-    float high = greater(rays.high[i], rays.rest[i]) * shrink + k.slope_error;
-    const bool met = high > RayBundle::kNone;
-    low = low < -kSteepest ? -kSteepest : low > kSteepest ? kSteepest : low;
-    middle = middle < -kSteepest ? -kSteepest : middle > kSteepest ? kSteepest : middle;
-    high = high < -kSteepest ? -kSteepest : high > kSteepest ? kSteepest : high;
-    const float low_tangent =
-        level + low * (rise + low * k.bend) - k.error * (1 + low * low);
-    const float tangent = level + middle * (rise + middle * k.bend);
-    const float high_tangent =
-        level + high * (rise + high * k.bend) + k.error * (1 + high * high);
-    float least = whole_below(arc_tangent_steps(low_tangent) - kRounding);
-    float most = -whole_below(-arc_tangent_steps(high_tangent) - kRounding);
-    // Slopes whose tangent is not modelled well any more.
-    constexpr float kSteep = 4, kSteepAllowance = 5;
-    least = magnitude(low) > kSteep ? least - kSteepAllowance : least;
-    most = magnitude(high) > kSteep ? most + kSteepAllowance : most;
-    float best = whole_below(arc_tangent_steps(tangent) + 0.5F);
-    least = met_low ? (least < -9000 ? -9000 : least) : -9000;
-    most = most > 9000 ? 9000 : most;
-    best = best < least ? least : best > most ? most : best;
-    const float nothing = kNothingSeen;
-    const bool is_unknown = rays.void_before[i] != 0;
-    const float unknown = kUnknownElevation;
-    estimate[i] = static_cast<std::int16_t>(is_unknown ? unknown : met ? best : nothing);
-    lower[i] = static_cast<std::int16_t>(is_unknown ? unknown : met ? least : nothing);
-    upper[i] = static_cast<std::int16_t>(is_unknown ? unknown : met ? most : nothing);
-  }
-}
-
 }  // namespace scarp
+#endif  // HWY_ONCE

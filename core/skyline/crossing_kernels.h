@@ -6,9 +6,9 @@
 namespace scarp {
 
 /// The loops of a march over plain arrays: kBundle rays of neighbouring cells side by side, in
-/// groups of kGroup. Each is written once; the compiler makes vectors of it for several instruction
-/// sets, and the processor chooses at run time. Every operation is rounded by itself and the only
-/// reductions are maxima, so that all of them give the same bits.
+/// groups of kGroup. Each is written once in vectors of any length (Highway), compiled for several
+/// instruction sets, and the processor chooses at run time. Every operation is rounded by itself
+/// and the only reductions are maxima, so that all of them give the same bits.
 inline constexpr std::int32_t kBundle = 64, kGroup = 16, kGroups = kBundle / kGroup;
 
 /// Rays of neighbouring cells and what is known of their horizons, as slopes.
@@ -43,7 +43,7 @@ void meet(const Crossing* crossings, std::size_t count, unsigned groups, RayBund
 void meet_and_measure(const Crossing* crossings, std::size_t count, unsigned groups,
                       RayBundle& rays);
 
-/// A segment that the rays of one group may cross, at a share known within `reach` or not at all.
+/// A segment that rays may cross, at a share known within `reach`, or not at all.
 struct PossibleCrossing {
   const float* a;  ///< of the bundle's first lane
   const float* b;
@@ -51,13 +51,14 @@ struct PossibleCrossing {
   float inverse_near, inverse_far;  ///< 1 / metres, bounds
 };
 /// Raises high only.
-void meet_high(const PossibleCrossing& crossing, int group, RayBundle& rays);
+void meet_high(const PossibleCrossing& crossing, unsigned groups, RayBundle& rays);
 
 /// Some rays meet a line near its samples, or not all in the same segment.
 struct LooseCrossing {
-  int first_ray, end_ray;
-  const float* z;           ///< sample at or before the first ray's place; the next two are used
+  int first_ray, end_ray;   ///< that take part
+  const float* z;           ///< of the bundle's first lane, and the next two lanes
   float place, place_step;  ///< lanes from there, growing from ray to ray; in [reach, 2 - reach]
+                            ///< for those that take part
   float reach;              ///< the place's error, lanes
   float inverse_run;        ///< 1 / metres
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 
 #include "core/skyline/crossing_kernels.h"
@@ -12,8 +13,11 @@ namespace {
 /// Lines that every ray crosses one by one; then squares take over.
 constexpr std::int32_t kNearLines = 24;
 
-/// Squares are at most this share of their distance.
-constexpr std::int32_t kDistanceInSquares = 8;
+/// Squares are asked first as large as this share of their distance.
+constexpr std::int32_t kDistanceInSquares = 2;
+
+/// Beforehand, lines are crossed this share of their distance apart.
+constexpr std::int32_t kDistanceInSteps = 10;
 
 constexpr unsigned kAllGroups = (1U << kGroups) - 1;
 
@@ -44,6 +48,7 @@ class BundleMarch {
     notes_void_ = ground_.has_void();
     const std::int32_t near = last_near_line();
     cross_lines(1, near, kAllGroups);
+    cross_some(near + 1);
     list_squares(near + 1);
     for (const Span& span : spans_) search_span(span, kAllGroups);
   }
@@ -57,13 +62,9 @@ class BundleMarch {
 
   std::int32_t line_at(std::int32_t k) const { return line_ + fan_.line_step * k; }
   /// Lanes from the begin of the bundle's first ray at the k-th line, and from ray to ray.
-  double place(std::int32_t k) const {
-    return fan_.place[static_cast<std::size_t>(k)] + k * turn_;
-  }
+  double place(std::int32_t k) const { return fan_.place[static_cast<std::size_t>(k)] + k * turn_; }
   double place_step(std::int32_t k) const { return k * fan_.turn.per_lane; }
-  double inverse_run(std::int32_t k) const {
-    return fan_.inverse_run[static_cast<std::size_t>(k)];
-  }
+  double inverse_run(std::int32_t k) const { return fan_.inverse_run[static_cast<std::size_t>(k)]; }
   /// Samples of a line by lane offset from the bundle's first ray.
   const float* samples(std::int32_t k, std::int32_t offset) const {
     return ground_.line(line_at(k)) + lane_ + offset;
@@ -83,6 +84,21 @@ class BundleMarch {
     return (line & ((1 << level) - 1)) == 0;
   }
 
+  /// Some lines at growing distances, so that low bounds are good before squares are asked. They
+  /// are lines that the neighbouring bundles cross too, where they can be.
+  void cross_some(std::int32_t first) {
+    notes_void_ = false;  // out of order here
+    for (std::int32_t k = first; k <= reach_;) {
+      cross_line(k, kAllGroups);
+      const std::int32_t step = std::max(k / kDistanceInSteps, 2);
+      const int level = std::bit_width(static_cast<unsigned>(step)) - 1;
+      k += 1 << level;
+      while (k <= reach_ && !begins_block(k, level)) ++k;
+    }
+    flush(kAllGroups);
+    notes_void_ = ground_.has_void();
+  }
+
   void list_squares(std::int32_t first) {
     spans_.clear();
     int level = MarchGround::kLeastLevel;
@@ -95,10 +111,6 @@ class BundleMarch {
       if (std::min(at, end) + lane_ > ground_.lanes() + kSwerveLanes ||
           std::max(at, end) + lane_ + kBundle < -kSwerveLanes)
         return;  // all rays have left the grid
-      notes_void_ = false;  // out of order here
-      cross_line(k, kAllGroups);
-      flush(kAllGroups);
-      notes_void_ = ground_.has_void();
       spans_.push_back(span);
       k = span.last + 1;
     }
@@ -171,8 +183,7 @@ class BundleMarch {
       bool found = false;
       for (int i = 0; i < square.count; ++i)
         for (int ray = g * kGroup; ray < (g + 1) * kGroup; ++ray)
-          found |= any_void[square.highest[i] - highest + ray] != 0 &&
-                   rays_->void_before[ray] == 0;
+          found |= any_void[square.highest[i] - highest + ray] != 0 && rays_->void_before[ray] == 0;
       if (found) open |= 1U << g & groups;
     }
     note_ground_behind(square, groups & ~open, *rays_);
@@ -204,9 +215,7 @@ class BundleMarch {
           groups);
       return;
     }
-    flush(groups);
-    for (int g = 0; g < kGroups; ++g)
-      if ((groups >> g & 1) != 0) cross_loosely(k, g * kGroup, (g + 1) * kGroup);
+    cross_loosely(k, 0, kBundle);
   }
 
   /// Rays that meet a line near samples or in several segments.
@@ -225,8 +234,8 @@ class BundleMarch {
     if (is_off_grid(offset)) return;
     const LooseCrossing crossing{first_ray,
                                  end_ray,
-                                 samples(k, offset) + first_ray,
-                                 static_cast<float>(at - base),
+                                 samples(k, offset),
+                                 static_cast<float>(place(k) - base),
                                  static_cast<float>(step),
                                  static_cast<float>(reach),
                                  static_cast<float>(inverse_run(k))};
@@ -321,8 +330,7 @@ class BundleMarch {
   }
   void add_possible(const PossibleCrossing& crossing, unsigned groups) {
     if (notes_void_) note_void(crossing.a, crossing.b, groups, *rays_);
-    for (int g = 0; g < kGroups; ++g)
-      if ((groups >> g & 1) != 0) meet_high(crossing, g, *rays_);
+    meet_high(crossing, groups, *rays_);
   }
 
   static constexpr int kMostSquares = 8;
@@ -352,7 +360,8 @@ void place_eyes(const GroundGrid& grid, const MarchGround& ground, std::int32_t 
     rays.eye_z[i] = known ? z[i] : 0;
     if (known && height_m > 0) {
       const bool rows = ground.march() == March::kOverRows;
-      const double raised_z_m = grid.raised(rows ? lane + i : line, rows ? line : lane + i, height_m).z_m;
+      const double raised_z_m =
+          grid.raised(rows ? lane + i : line, rows ? line : lane + i, height_m).z_m;
       rays.eye_z[i] = static_cast<float>(raised_z_m - ground.middle_z_m());
     }
     rays.low[i] = known ? MarchGround::kNothing : -MarchGround::kNothing;
@@ -386,22 +395,22 @@ void march_tile(const GroundGrid& grid, const MarchGround& ground, const RayFan&
           fan.level.at(p, q) + fan.level_z * (ground.middle_z_m() - fan.middle_z_m);
       const double rise = fan.rise.at(p, q) + fan.rise_z * (ground.middle_z_m() - fan.middle_z_m);
       const double shrink = 1 / fan.stretch.at(p, q);
-      const ElevationRow row{static_cast<float>(level),
-                             static_cast<float>(fan.level.per_lane),
-                             static_cast<float>(rise),
-                             static_cast<float>(fan.rise.per_lane),
-                             static_cast<float>(fan.level_z),
-                             static_cast<float>(fan.rise_z),
-                             static_cast<float>(fan.bend),
-                             static_cast<float>(shrink),
-                             static_cast<float>(-fan.stretch.per_lane * shrink * shrink),
-                             static_cast<float>(fan.tangent_error),
-                             static_cast<float>(4 * ground.rounding_m() *
-                                                (fan.reach() > 0 ? fan.inverse_run[1] : 0))};
+      const ElevationRow row{
+          static_cast<float>(level),
+          static_cast<float>(fan.level.per_lane),
+          static_cast<float>(rise),
+          static_cast<float>(fan.rise.per_lane),
+          static_cast<float>(fan.level_z),
+          static_cast<float>(fan.rise_z),
+          static_cast<float>(fan.bend),
+          static_cast<float>(shrink),
+          static_cast<float>(-fan.stretch.per_lane * shrink * shrink),
+          static_cast<float>(fan.tangent_error),
+          static_cast<float>(4 * ground.rounding_m() * (fan.reach() > 0 ? fan.inverse_run[1] : 0))};
       elevations(row, rays, estimate.data(), lower.data(), upper.data());
       const auto count = static_cast<std::ptrdiff_t>(std::min(kBundle, tile.lanes - i));
-      const std::size_t to = static_cast<std::size_t>(line - tile.first_line) * lanes +
-                             static_cast<std::size_t>(i);
+      const std::size_t to =
+          static_cast<std::size_t>(line - tile.first_line) * lanes + static_cast<std::size_t>(i);
       std::copy_n(estimate.begin(), count, &horizons.estimate[to]);
       std::copy_n(lower.begin(), count, &horizons.lower[to]);
       std::copy_n(upper.begin(), count, &horizons.upper[to]);

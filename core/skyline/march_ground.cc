@@ -28,8 +28,7 @@ void any_of_four(std::size_t count, std::size_t shift, const std::uint8_t* __res
                  const std::uint8_t* __restrict second, std::uint8_t* __restrict to) {
   const std::size_t inside = count > shift ? count - shift : 0;
   for (std::size_t i = 0; i < inside; ++i)
-    to[i] =
-        static_cast<std::uint8_t>(first[i] | second[i] | first[i + shift] | second[i + shift]);
+    to[i] = static_cast<std::uint8_t>(first[i] | second[i] | first[i + shift] | second[i + shift]);
   for (std::size_t i = inside; i < count; ++i)
     to[i] = static_cast<std::uint8_t>(first[i] | second[i]);
 }
@@ -94,7 +93,8 @@ void MarchGround::read_heights(const GroundGrid& grid) {
   const std::int64_t most = *std::max_element(high.begin(), high.end());
   const std::int64_t middle = most >= least ? (least + most) / 2 : 0;
   middle_z_m_ = static_cast<double>(middle) * kLatticeStepM;
-  const double reach_m = static_cast<double>(std::max<std::int64_t>(most - middle, 0)) * kLatticeStepM;
+  const double reach_m =
+      static_cast<double>(std::max<std::int64_t>(most - middle, 0)) * kLatticeStepM;
   rounding_m_ = reach_m < 4095 ? 0 : reach_m * 0x1p-24;
   const auto value = [&](std::int32_t step) {
     return step == GroundGrid::kVoid
@@ -130,8 +130,8 @@ void MarchGround::build_level(std::size_t index) {
     if (index == 0) {
       std::vector<std::vector<float>> heights(static_cast<std::size_t>(side),
                                               std::vector<float>(stride_, kNothing));
-      std::vector<std::vector<std::uint8_t>> voids(
-          has_void_ ? static_cast<std::size_t>(side) : 0, std::vector<std::uint8_t>(stride_, 0));
+      std::vector<std::vector<std::uint8_t>> voids(has_void_ ? static_cast<std::size_t>(side) : 0,
+                                                   std::vector<std::uint8_t>(stride_, 0));
       for (std::size_t i = 0; i < static_cast<std::size_t>(side); ++i) {
         const std::size_t line = block * static_cast<std::size_t>(side) + i;
         if (line >= static_cast<std::size_t>(lines_)) break;

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 
-
 namespace scarp {
 namespace {
 
@@ -46,8 +45,8 @@ class PlanMap {
     const std::int32_t next_c = std::min(c + 1, grid_.columns() - 1);
     const std::int32_t next_r = std::min(r + 1, grid_.rows() - 1);
     const auto between = [&](double Position::*axis) {
-      const double north = grid_.at(c, r).*axis +
-                           right * (grid_.at(next_c, r).*axis - grid_.at(c, r).*axis);
+      const double north =
+          grid_.at(c, r).*axis + right * (grid_.at(next_c, r).*axis - grid_.at(c, r).*axis);
       const double south = grid_.at(c, next_r).*axis +
                            right * (grid_.at(next_c, next_r).*axis - grid_.at(c, next_r).*axis);
       return north + below * (south - north);
@@ -71,8 +70,8 @@ class PlanMap {
     double most = 0;
     if (!blocks) return most;
     for (const BlockPlacement::Block& block : blocks->blocks)
-      most = std::max(most, std::hypot(block[BlockPlacement::kTiltX][0],
-                                       block[BlockPlacement::kTiltY][0]));
+      most = std::max(
+          most, std::hypot(block[BlockPlacement::kTiltX][0], block[BlockPlacement::kTiltY][0]));
     return most * 1.1;
   }
   double seam_m() const {
@@ -263,8 +262,7 @@ class FanMaker {
 
   void fill_tables() {
     const std::int32_t last_line = tile_.first_line + tile_.lines - 1;
-    const double room_lines =
-        fan_.line_step > 0 ? map_.lines() - 1 - tile_.first_line : last_line;
+    const double room_lines = fan_.line_step > 0 ? map_.lines() - 1 - tile_.first_line : last_line;
     const std::int32_t last_lane = tile_.first_lane + tile_.lanes - 1;
     const double room_lanes = along_ > 0 ? map_.lanes() - 1 - tile_.first_lane : last_lane;
     // Beyond, every ray has left the grid sideways, whatever the course does on its way.
@@ -298,8 +296,7 @@ class FanMaker {
           if (!found) continue;
           const double off = std::abs(found->place - place_(k) - fan_.turn.at(p, q)) * k;
           rate = std::max(rate, (off - fan_.slack_fixed) / k);
-          const double run_off =
-              std::abs(found->run_m / (run_(k) * fan_.stretch.at(p, q)) - 1);
+          const double run_off = std::abs(found->run_m / (run_(k) * fan_.stretch.at(p, q)) - 1);
           run_share = std::max(run_share, run_off - rounding_m / (k * line_run_m_));
         }
       }
@@ -382,7 +379,7 @@ class FanMaker {
   const double lane_, line_;
   const PlanRay middle_;
   double along_ = 0, lane_m_ = 1, line_run_m_ = 1;
-  double swerve_ = 0;  ///< lanes a line by which the course may change on the way
+  double swerve_ = 0;       ///< lanes a line by which the course may change on the way
   Polynomial place_, run_;  // over k, each per line crossed
   RayFan fan_;
 };

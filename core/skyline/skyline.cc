@@ -66,12 +66,11 @@ Skyline::Skyline(const GroundGrid& grid, const std::optional<EarthFrame>& earth,
 March Skyline::march_for(const AzimuthAt& azimuth) const {
   const MarchTile whole{0, grid_.columns(), 0, grid_.rows()};
   return runs_along(grid_, earth_, March::kOverRows, whole, azimuth) <= 1 ? March::kOverRows
-                                                                           : March::kOverColumns;
+                                                                          : March::kOverColumns;
 }
 
 const MarchGround& Skyline::ground_for(March march) {
-  std::unique_ptr<MarchGround>& ground =
-      march == March::kOverRows ? over_rows_ : over_columns_;
+  std::unique_ptr<MarchGround>& ground = march == March::kOverRows ? over_rows_ : over_columns_;
   if (!ground) ground = std::make_unique<MarchGround>(grid_, march);
   return *ground;
 }
@@ -85,9 +84,9 @@ std::vector<Skyline::Part> Skyline::parts_for(March preferred, const AzimuthAt& 
   std::vector<Part> parts;
   for (std::int32_t line = 0; line < lines; line += tile_lines)
     for (std::int32_t lane = 0; lane < lanes; lane += tile_lanes)
-      parts.push_back({{lane, std::min(tile_lanes, lanes - lane), line,
-                        std::min(tile_lines, lines - line)},
-                       preferred});
+      parts.push_back(
+          {{lane, std::min(tile_lanes, lanes - lane), line, std::min(tile_lines, lines - line)},
+           preferred});
   parallel_for(parts.size(), [&](std::size_t i) {
     Part& part = parts[i];
     if (runs_along(grid_, earth_, preferred, part.tile, azimuth) <= kPreferredAlong) return;
@@ -131,8 +130,8 @@ void Skyline::look_from(const Part& part, const MarchGround& ground, const Azimu
   const std::int32_t first_row = rows ? part.tile.first_line : part.tile.first_lane;
   for (std::int32_t r = 0; r < down; ++r) {
     for (std::int32_t c = 0; c < across; ++c) {
-      const std::size_t from = static_cast<std::size_t>(rows ? r : c) * lanes +
-                               static_cast<std::size_t>(rows ? c : r);
+      const std::size_t from =
+          static_cast<std::size_t>(rows ? r : c) * lanes + static_cast<std::size_t>(rows ? c : r);
       const std::size_t to = static_cast<std::size_t>(first_row + r) * columns +
                              static_cast<std::size_t>(first_column + c);
       bands.estimate[to] = found.estimate[from];
@@ -168,11 +167,10 @@ JudgedHorizon judge_horizon(const GroundGrid& grid, const std::optional<EarthFra
   double reach_m = 0;
   for (const std::int32_t c : {0, grid.columns() - 1})
     for (const std::int32_t r : {0, grid.rows() - 1})
-      reach_m = std::max(reach_m, std::hypot(grid.at(c, r).x_m - eye.x_m,
-                                             grid.at(c, r).y_m - eye.y_m));
+      reach_m =
+          std::max(reach_m, std::hypot(grid.at(c, r).x_m - eye.x_m, grid.at(c, r).y_m - eye.y_m));
   // Borders bend outwards between the corners by less.
-  const Position end =
-      ray_end(eye, bearings.plane_direction_rad(azimuth_rad), reach_m * 1.1 + 100);
+  const Position end = ray_end(eye, bearings.plane_direction_rad(azimuth_rad), reach_m * 1.1 + 100);
   const GroundAlong along = GridSight(grid, eye).ground_along(end);
   const auto horizon = ray_horizon(eye, end, along);
   judged.is_known = !horizon || !horizon->over_void;
@@ -193,8 +191,7 @@ std::size_t cast_shadow(const GroundGrid& grid, const std::optional<EarthFrame>&
   SkylineOptions options;
   options.tolerance_rad = kStepRad;
   LargeArray<std::int16_t> estimate(samples), lower(samples), upper(samples);
-  Skyline(grid, earth, options)
-      .look(azimuth, {estimate.span(), lower.span(), upper.span(), {}});
+  Skyline(grid, earth, options).look(azimuth, {estimate.span(), lower.span(), upper.span(), {}});
   std::atomic<std::size_t> judged_samples{0};
   parallel_for(static_cast<std::size_t>(grid.rows()), [&](std::size_t r) {
     for (std::size_t c = 0; c < columns; ++c) {
@@ -216,7 +213,7 @@ std::size_t cast_shadow(const GroundGrid& grid, const std::optional<EarthFrame>&
         const JudgedHorizon judged = judge_horizon(grid, earth, 0, column, row, at.azimuth_rad);
         if (judged.is_known)
           light[i] = !judged.met || judged.elevation_rad <= elevation_rad ? Sunlight::kLit
-                                                                           : Sunlight::kShadow;
+                                                                          : Sunlight::kShadow;
       }
     }
   });
