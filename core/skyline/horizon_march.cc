@@ -33,16 +33,32 @@ class BundleMarch {
         fan_(fan),
         tile_(tile),
         search_(search),
-        exact_(fan.slack_fixed == 0 && fan.slack_rate == 0) {}
+        exact_(fan.slack_fixed == 0 && fan.slack_rate == 0),
+        steps_(fan.place.size()) {}
 
-  /// Requires rays with eyes, from a lane on.
-  void run(std::int32_t lane, std::int32_t line, RayBundle& rays) {
+  /// Lines of cells that share the places of their crossings: so many that these are off by
+  /// kStripeSlack at most.
+  std::int32_t stripe_lines() const {
+    const double change = std::abs(fan_.turn.per_line);
+    return change * kMostStripeLines <= kStripeSlack
+               ? kMostStripeLines
+               : std::max(1, static_cast<std::int32_t>(kStripeSlack / change));
+  }
+
+  /// Begins a stripe of bundles, one above the other.
+  void begin_stripe(std::int32_t lane, std::int32_t first_line, std::int32_t lines) {
     lane_ = lane;
+    const double p = lane - tile_.first_lane - (tile_.lanes - 1) / 2.0;
+    const double q = first_line + (lines - 1) / 2.0 - tile_.first_line - (tile_.lines - 1) / 2.0;
+    turn_ = fan_.turn.at(p, q);
+    stripe_slack_ = exact_ ? 0 : std::abs(fan_.turn.per_line) * (lines - 1) / 2;
+    ++stripe_;
+  }
+
+  /// Requires rays with eyes, from the stripe's first lane on.
+  void run(std::int32_t line, RayBundle& rays) {
     line_ = line;
     rays_ = &rays;
-    const double p = lane - tile_.first_lane - (tile_.lanes - 1) / 2.0;
-    const double q = line - tile_.first_line - (tile_.lines - 1) / 2.0;
-    turn_ = fan_.turn.at(p, q);
     reach_ = std::min(fan_.reach(), fan_.line_step > 0 ? ground_.lines() - 1 - line : line);
     if (reach_ < 1) return;
     notes_void_ = ground_.has_void();
@@ -63,6 +79,7 @@ class BundleMarch {
   std::int32_t line_at(std::int32_t k) const { return line_ + fan_.line_step * k; }
   /// Lanes from the begin of the bundle's first ray at the k-th line, and from ray to ray.
   double place(std::int32_t k) const { return fan_.place[static_cast<std::size_t>(k)] + k * turn_; }
+  double slack(std::int32_t k) const { return fan_.slack(k) + k * stripe_slack_; }
   double place_step(std::int32_t k) const { return k * fan_.turn.per_lane; }
   double inverse_run(std::int32_t k) const { return fan_.inverse_run[static_cast<std::size_t>(k)]; }
   /// Samples of a line by lane offset from the bundle's first ray.
@@ -148,9 +165,9 @@ class BundleMarch {
       high = std::max(high, at);
     }
     const double half = (after - before) / 2.0;
-    const double slack = fan_.slack(after) + fan_.bulge * half * half + kNearSample;
-    const auto first = static_cast<std::int32_t>(std::floor(low - slack));
-    const auto last = static_cast<std::int32_t>(std::floor(high + slack)) + 1;
+    const double margin = slack(after) + fan_.bulge * half * half + kNearSample;
+    const auto first = static_cast<std::int32_t>(std::floor(low - margin));
+    const auto last = static_cast<std::int32_t>(std::floor(high + margin)) + 1;
     square.count = 0;
     square.inverse_near = static_cast<float>(inverse_run(span.first));
     square.inverse_far = static_cast<float>(inverse_run(span.last));
@@ -200,29 +217,66 @@ class BundleMarch {
     flush(groups);
   }
 
+  /// Crossings that all rays of a bundle have for certain, alike for the bundles of a stripe but
+  /// for the lines' numbers.
+  struct Step {
+    std::int32_t stripe = 0;  ///< that it holds for
+    bool is_line_sure = false, is_between_sure = false;
+    std::int32_t line = 0;  ///< of the bundle that it was made for
+    int betweens = 0;
+    Crossing at_line;
+    std::array<Crossing, 2> between;
+  };
+
+  Step& step_at(std::int32_t k) {
+    Step& step = steps_[static_cast<std::size_t>(k)];
+    if (step.stripe == stripe_) return step;
+    step.stripe = stripe_;
+    step.line = line_;
+    step.is_line_sure = make_line(k, step);
+    step.betweens = 0;
+    step.is_between_sure = make_between(k, step);
+    return step;
+  }
+  std::ptrdiff_t shift_of(const Step& step) const {
+    return (line_ - step.line) * ground_.stride();
+  }
+
   void cross_line(std::int32_t k, unsigned groups) {
-    const double at = place(k), step = place_step(k), slack = fan_.slack(k);
-    const double near = exact_ ? 0 : 2 * slack + kNearSample;
+    const Step& step = step_at(k);
+    if (step.is_line_sure)
+      add(step.at_line, shift_of(step), groups);
+    else
+      cross_loosely(k, 0, kBundle);
+  }
+
+  /// @return false where some ray is near a sample or in another segment
+  bool make_line(std::int32_t k, Step& to) const {
+    const double at = place(k), step = place_step(k), slack_lanes = slack(k);
+    const double near = exact_ ? 0 : 2 * slack_lanes + kNearSample;
     const double end = at + step * (kBundle - 1);
     const double whole = std::floor(std::min(at, end));
     const auto offset = static_cast<std::int32_t>(whole);
-    if (is_off_grid(offset)) return;
-    if (std::min(at, end) - whole >= near && std::max(at, end) - whole <= 1 - near) {
-      const float* a = samples(k, offset);
-      const bool on_samples = exact_ && at == whole;
-      add({a, on_samples ? a : a + 1, static_cast<float>(at - whole), static_cast<float>(step),
-           static_cast<float>(inverse_run(k)), 0, static_cast<float>(slack * inverse_run(k)), 0},
-          groups);
-      return;
-    }
-    cross_loosely(k, 0, kBundle);
+    if (is_off_grid(offset)) return false;
+    if (std::min(at, end) - whole < near || std::max(at, end) - whole > 1 - near) return false;
+    const float* a = samples(k, offset);
+    const bool on_samples = exact_ && at == whole;
+    to.at_line = {a,
+                  on_samples ? a : a + 1,
+                  static_cast<float>(at - whole),
+                  static_cast<float>(step),
+                  static_cast<float>(inverse_run(k)),
+                  0,
+                  static_cast<float>(slack_lanes * inverse_run(k)),
+                  0};
+    return true;
   }
 
   /// Rays that meet a line near samples or in several segments.
   void cross_loosely(std::int32_t k, int first_ray, int end_ray) {
     const double step = place_step(k), at = place(k) + step * first_ray;
     const double end = at + step * (end_ray - first_ray - 1);
-    const double reach = fan_.slack(k) + kNearSample / 4;
+    const double reach = slack(k) + kNearSample / 4;
     const double base = std::floor(std::min(at, end) - 2 * reach);
     if (std::max(at, end) + 2 * reach > base + 2 && end_ray - first_ray > 1) {
       const int middle = (first_ray + end_ray) / 2;
@@ -245,80 +299,112 @@ class BundleMarch {
 
   /// Segments that join a line's samples to those of the line before.
   void cross_between(std::int32_t k, unsigned groups) {
+    const Step& step = step_at(k);
+    if (!step.is_between_sure) {
+      visit_between(k, [&](const BetweenPlace& place) { add_unsurely(k, place, groups); });
+      return;
+    }
+    for (int i = 0; i < step.betweens; ++i)
+      add(step.between[static_cast<std::size_t>(i)], shift_of(step), groups);
+  }
+
+  /// Where rays cross between the k-th line and the one before: in column `lane_offset`, the first
+  /// and the last ray at a share of the way.
+  struct BetweenPlace {
+    std::int32_t lane_offset;
+    double at, end, reach;
+    bool anywhere;  ///< the share is not known at all
+  };
+
+  template <typename Visit>
+  void visit_between(std::int32_t k, const Visit& visit) const {
     const double from = place(k - 1), to = place(k);
     const double last_from = from + place_step(k - 1) * (kBundle - 1);
     const double last_to = to + place_step(k) * (kBundle - 1);
     const double along = to - from, last_along = last_to - last_from;
-    const double slack = fan_.slack(k);
     constexpr double kParallel = 1e-9;
-    if (std::abs(along) < kParallel || along * last_along <= 0) {
-      if (!exact_) cross_parallel(k, groups);
+    const bool is_parallel = std::abs(along) < kParallel || along * last_along <= 0;
+    if (is_parallel && exact_) return;
+    const auto [low, high] = std::minmax({from, last_from, to, last_to});
+    const double slack_lanes = slack(k);
+    const auto first = static_cast<std::int32_t>(std::ceil(low - slack_lanes));
+    const auto last = static_cast<std::int32_t>(std::floor(high + slack_lanes));
+    if (first > last) return;
+    const double bent = is_parallel ? 0 : (last_along - along) / along;
+    const double reach =
+        is_parallel ? 1 : std::min(1.0, slack_lanes / std::abs(along) + bent * bent / 4);
+    for (std::int32_t j = first; j <= last; ++j) {
+      // Not the cell's own column at the begin of its ray.
+      if ((k == 1 && j == 0) || is_off_grid(j)) continue;
+      const BetweenPlace found{j, is_parallel ? 0.5 : (j - from) / along,
+                               is_parallel ? 0.5 : (j - last_from) / last_along, reach,
+                               reach > kSureReach};
+      if (std::max(found.at, found.end) < -reach || std::min(found.at, found.end) > 1 + reach)
+        continue;
+      visit(found);
+    }
+  }
+
+  /// @return false where it is not certain that each ray crosses
+  bool make_between(std::int32_t k, Step& to) const {
+    bool is_sure = true;
+    visit_between(k, [&](const BetweenPlace& found) {
+      const double near = 2 * found.reach + kNearSample;
+      const double least = std::min(found.at, found.end), most = std::max(found.at, found.end);
+      is_sure = is_sure && !found.anywhere && least >= near && most <= 1 - near &&
+                static_cast<std::size_t>(to.betweens) < to.between.size();
+      if (!is_sure) return;
+      const double inverse = 1 / run_at(k, found.at), last_inverse = 1 / run_at(k, found.end);
+      to.between[static_cast<std::size_t>(to.betweens++)] = {
+          samples(k - 1, found.lane_offset),
+          samples(k, found.lane_offset),
+          static_cast<float>(found.at),
+          static_cast<float>((found.end - found.at) / (kBundle - 1)),
+          static_cast<float>(inverse),
+          static_cast<float>((last_inverse - inverse) / (kBundle - 1)),
+          static_cast<float>(found.reach * inverse),
+          static_cast<float>(found.reach / (k - 1 + least))};
+    });
+    return is_sure;
+  }
+
+  /// One of several segments of which some are not crossed by all rays for certain.
+  void add_unsurely(std::int32_t k, const BetweenPlace& found, unsigned groups) {
+    const float* a = samples(k - 1, found.lane_offset);
+    const float* b = samples(k, found.lane_offset);
+    if (found.anywhere) {
+      // No place on it is seen higher than both of its ends.
+      const auto inverse = static_cast<float>(inverse_run(k));
+      add_possible({a, b, 1, 0, 0, inverse, inverse}, groups);
+      if (k == 1) return;
+      const auto before = static_cast<float>(inverse_run(k - 1));
+      add_possible({a, b, 0, 0, 0, before, before}, groups);
       return;
     }
-    const auto [low, high] = std::minmax({from, last_from, to, last_to});
-    const auto first = static_cast<std::int32_t>(std::ceil(low - slack));
-    const auto last = static_cast<std::int32_t>(std::floor(high + slack));
-    const double bent = (last_along - along) / along;
-    const double reach = std::min(1.0, slack / std::abs(along) + bent * bent / 4);
-    const double near = 2 * reach + kNearSample;
-    for (std::int32_t j = first; j <= last; ++j) {
-      // The cell's own column at the begin of its ray.
-      if ((k == 1 && j == 0) || is_off_grid(j)) continue;
-      const double at = (j - from) / along, end = (j - last_from) / last_along;
-      if (std::max(at, end) < -reach || std::min(at, end) > 1 + reach) continue;
-      const float* a = samples(k - 1, j);
-      const float* b = samples(k, j);
-      const double least = std::min(at, end), most = std::max(at, end);
-      if (least >= near && most <= 1 - near && reach <= kSureReach) {
-        const double inverse = 1 / run_at(k - 1 + at), last_inverse = 1 / run_at(k - 1 + end);
-        add({a, b, static_cast<float>(at), static_cast<float>((end - at) / (kBundle - 1)),
-             static_cast<float>(inverse),
-             static_cast<float>((last_inverse - inverse) / (kBundle - 1)),
-             static_cast<float>(reach * inverse), static_cast<float>(reach / (k - 1 + least))},
-            groups);
-      } else if (reach <= kSureReach) {
-        add_possible({a, b, static_cast<float>(at), static_cast<float>((end - at) / (kBundle - 1)),
-                      static_cast<float>(reach),
-                      static_cast<float>(1 / run_at(k - 1 + std::max(least - reach, 0.0))),
-                      static_cast<float>(1 / run_at(k - 1 + std::min(most + reach, 1.0)))},
-                     groups);
-      } else {
-        add_either_end(k, a, b, groups);
-      }
-    }
+    const double least = std::min(found.at, found.end), most = std::max(found.at, found.end);
+    add_possible({a, b, static_cast<float>(found.at),
+                  static_cast<float>((found.end - found.at) / (kBundle - 1)),
+                  static_cast<float>(found.reach),
+                  static_cast<float>(1 / run_at(k, std::max(least - found.reach, 0.0))),
+                  static_cast<float>(1 / run_at(k, std::min(most + found.reach, 1.0)))},
+                 groups);
   }
 
-  /// Rays along a column of samples, for all that is known.
-  void cross_parallel(std::int32_t k, unsigned groups) {
-    const double slack = fan_.slack(k);
-    const double at = place(k), end = at + place_step(k) * (kBundle - 1);
-    const auto first = static_cast<std::int32_t>(std::ceil(std::min(at, end) - slack));
-    for (std::int32_t j = first; j <= std::max(at, end) + slack; ++j)
-      if (!(k == 1 && j == 0) && !is_off_grid(j))
-        add_either_end(k, samples(k - 1, j), samples(k, j), groups);
-  }
-
-  /// A segment that may be crossed anywhere: no place on it is seen higher than both of its ends.
-  void add_either_end(std::int32_t k, const float* a, const float* b, unsigned groups) {
-    const auto inverse = static_cast<float>(inverse_run(k));
-    add_possible({a, b, 1, 0, 0, inverse, inverse}, groups);
-    if (k == 1) return;
-    const auto before = static_cast<float>(inverse_run(k - 1));
-    add_possible({a, b, 0, 0, 0, before, before}, groups);
-  }
-
-  /// Metres to a place between two lines.
-  double run_at(double k) const {
-    const auto before = static_cast<std::int32_t>(std::clamp(k, 0.0, fan_.reach() - 1.0));
-    const double from = before == 0 ? 0 : 1 / inverse_run(before);
-    const double step = 1 / inverse_run(before + 1) - from;
+  /// Metres to a place at a share of the way from the line before to the k-th.
+  double run_at(std::int32_t k, double share) const {
+    const double from = k == 1 ? 0 : 1 / inverse_run(k - 1);
+    const double step = 1 / inverse_run(k) - from;
     constexpr double kLeastShare = 0.01;  // of a line: nothing is met nearer
-    return std::max(from + (k - before) * step, kLeastShare * step);
+    return std::max(from + share * step, kLeastShare * step);
   }
 
-  void add(const Crossing& crossing, unsigned groups) {
-    if (notes_void_) note_void(crossing.a, crossing.b, groups, *rays_);
-    crossings_[count_++] = crossing;
+  /// @param shift  of the samples, from where the crossing was made
+  void add(const Crossing& crossing, std::ptrdiff_t shift, unsigned groups) {
+    Crossing& added = crossings_[count_++];
+    added = crossing;
+    added.a += shift;
+    added.b += shift;
+    if (notes_void_) note_void(added.a, added.b, groups, *rays_);
     if (count_ == crossings_.size()) flush(groups);
   }
   void flush(unsigned groups) {
@@ -336,6 +422,8 @@ class BundleMarch {
   static constexpr int kMostSquares = 8;
   static constexpr double kSwerveLanes = 64;
   static constexpr double kSureReach = 0.05;
+  static constexpr std::int32_t kMostStripeLines = 16;
+  static constexpr double kStripeSlack = 4e-5;  ///< lanes per line crossed
 
   const MarchGround& ground_;
   const RayFan& fan_;
@@ -343,7 +431,9 @@ class BundleMarch {
   const MarchSearch& search_;
   const bool exact_;
   std::int32_t lane_ = 0, line_ = 0, reach_ = 0;
-  double turn_ = 0;
+  double turn_ = 0, stripe_slack_ = 0;
+  std::int32_t stripe_ = 0;
+  std::vector<Step> steps_;  ///< by line crossed
   RayBundle* rays_ = nullptr;
   std::vector<Span> spans_;
   std::array<Crossing, 64> crossings_;
@@ -372,6 +462,38 @@ void place_eyes(const GroundGrid& grid, const MarchGround& ground, std::int32_t 
   }
 }
 
+/// Of the bundle whose first lane is the tile's i-th.
+void write_elevations(const MarchGround& ground, const RayFan& fan, const MarchTile& tile,
+                      std::int32_t i, std::int32_t line, const RayBundle& rays,
+                      const MarchSearch& search, TileHorizons& horizons) {
+  const double p = i - (tile.lanes - 1) / 2.0;
+  const double q = line - tile.first_line - (tile.lines - 1) / 2.0;
+  const double z_m = ground.middle_z_m() - fan.middle_z_m;
+  const double shrink = 1 / fan.stretch.at(p, q);
+  const double nearest = fan.reach() > 0 ? fan.inverse_run[1] : 0;
+  const ElevationRow row{static_cast<float>(fan.level.at(p, q) + fan.level_z * z_m),
+                         static_cast<float>(fan.level.per_lane),
+                         static_cast<float>(fan.rise.at(p, q) + fan.rise_z * z_m),
+                         static_cast<float>(fan.rise.per_lane),
+                         static_cast<float>(fan.level_z),
+                         static_cast<float>(fan.rise_z),
+                         static_cast<float>(fan.bend),
+                         static_cast<float>(shrink),
+                         static_cast<float>(-fan.stretch.per_lane * shrink * shrink),
+                         static_cast<float>(fan.tangent_error),
+                         static_cast<float>(4 * ground.rounding_m() * nearest)};
+  std::array<std::int16_t, kBundle> estimate, lower, upper;
+  elevations(row, rays, estimate.data(), lower.data(), upper.data());
+  const auto count = static_cast<std::ptrdiff_t>(std::min(kBundle, tile.lanes - i));
+  const std::size_t to =
+      static_cast<std::size_t>(line - tile.first_line) * static_cast<std::size_t>(tile.lanes) +
+      static_cast<std::size_t>(i);
+  std::copy_n(estimate.begin(), count, &horizons.estimate[to]);
+  std::copy_n(lower.begin(), count, &horizons.lower[to]);
+  std::copy_n(upper.begin(), count, &horizons.upper[to]);
+  if (search.measures_distance) std::copy_n(rays.run, count, &horizons.run_m[to]);
+}
+
 }  // namespace
 
 void march_tile(const GroundGrid& grid, const MarchGround& ground, const RayFan& fan,
@@ -384,37 +506,17 @@ void march_tile(const GroundGrid& grid, const MarchGround& ground, const RayFan&
   if (search.measures_distance) horizons.run_m.resize(cells);
   BundleMarch march(ground, fan, tile, search);
   RayBundle rays;
-  std::array<std::int16_t, kBundle> estimate, lower, upper;
-  for (std::int32_t line = tile.first_line; line < tile.first_line + tile.lines; ++line) {
-    const double q = line - tile.first_line - (tile.lines - 1) / 2.0;
+  const std::int32_t stripe_lines = march.stripe_lines();
+  const std::int32_t end_line = tile.first_line + tile.lines;
+  for (std::int32_t stripe = tile.first_line; stripe < end_line; stripe += stripe_lines) {
+    const std::int32_t stripe_end = std::min(stripe + stripe_lines, end_line);
     for (std::int32_t i = 0; i < tile.lanes; i += kBundle) {
-      const double p = i - (tile.lanes - 1) / 2.0;
-      place_eyes(grid, ground, tile.first_lane + i, line, search.eye_height_m, rays);
-      march.run(tile.first_lane + i, line, rays);
-      const double level =
-          fan.level.at(p, q) + fan.level_z * (ground.middle_z_m() - fan.middle_z_m);
-      const double rise = fan.rise.at(p, q) + fan.rise_z * (ground.middle_z_m() - fan.middle_z_m);
-      const double shrink = 1 / fan.stretch.at(p, q);
-      const ElevationRow row{
-          static_cast<float>(level),
-          static_cast<float>(fan.level.per_lane),
-          static_cast<float>(rise),
-          static_cast<float>(fan.rise.per_lane),
-          static_cast<float>(fan.level_z),
-          static_cast<float>(fan.rise_z),
-          static_cast<float>(fan.bend),
-          static_cast<float>(shrink),
-          static_cast<float>(-fan.stretch.per_lane * shrink * shrink),
-          static_cast<float>(fan.tangent_error),
-          static_cast<float>(4 * ground.rounding_m() * (fan.reach() > 0 ? fan.inverse_run[1] : 0))};
-      elevations(row, rays, estimate.data(), lower.data(), upper.data());
-      const auto count = static_cast<std::ptrdiff_t>(std::min(kBundle, tile.lanes - i));
-      const std::size_t to =
-          static_cast<std::size_t>(line - tile.first_line) * lanes + static_cast<std::size_t>(i);
-      std::copy_n(estimate.begin(), count, &horizons.estimate[to]);
-      std::copy_n(lower.begin(), count, &horizons.lower[to]);
-      std::copy_n(upper.begin(), count, &horizons.upper[to]);
-      if (search.measures_distance) std::copy_n(rays.run, count, &horizons.run_m[to]);
+      march.begin_stripe(tile.first_lane + i, stripe, stripe_end - stripe);
+      for (std::int32_t line = stripe; line < stripe_end; ++line) {
+        place_eyes(grid, ground, tile.first_lane + i, line, search.eye_height_m, rays);
+        march.run(line, rays);
+        write_elevations(ground, fan, tile, i, line, rays, search, horizons);
+      }
     }
   }
 }

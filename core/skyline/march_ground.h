@@ -44,6 +44,8 @@ class MarchGround {
   bool has_void() const { return has_void_; }
   int greatest_level() const { return kLeastLevel + static_cast<int>(highest_.size()) - 1; }
 
+  /// Samples from one line to the next.
+  std::ptrdiff_t stride() const { return static_cast<std::ptrdiff_t>(stride_); }
   /// Heights of a line by lane, from -kPad on.
   const float* line(std::int32_t line) const { return &z_[base(line)]; }
   /// Greatest heights of squares of 2^level samples, by first lane, from -kPad on.
