@@ -27,7 +27,8 @@ HWY_INLINE bool takes_part(unsigned groups, std::size_t ray) {
   return (groups >> (ray / kGroup) & 1) != 0;
 }
 
-void meet_now(const Crossing* crossings, std::size_t count, unsigned groups, RayBundle& rays) {
+void meet_now(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift, unsigned groups,
+              RayBundle& rays) {
   for (std::size_t ray = 0; ray < kBundle; ray += hn::Lanes(kTag)) {
     if (!takes_part(groups, ray)) continue;
     Vector low = hn::Load(kTag, rays.low + ray), high = hn::Load(kTag, rays.high + ray);
@@ -35,7 +36,8 @@ void meet_now(const Crossing* crossings, std::size_t count, unsigned groups, Ray
     const Vector number = hn::Iota(kTag, static_cast<float>(ray));
     for (std::size_t i = 0; i < count; ++i) {
       const Crossing& c = crossings[i];
-      const Vector a = hn::LoadU(kTag, c.a + ray), difference = hn::LoadU(kTag, c.b + ray) - a;
+      const Vector a = hn::LoadU(kTag, c.a + shift + ray);
+      const Vector difference = hn::LoadU(kTag, c.b + shift + ray) - a;
       const Vector share = value(c.share) + value(c.share_step) * number;
       const Vector inverse = value(c.inverse_run) + value(c.inverse_run_step) * number;
       const Vector slope = ((a - eye) + share * difference) * inverse;
@@ -48,8 +50,8 @@ void meet_now(const Crossing* crossings, std::size_t count, unsigned groups, Ray
   }
 }
 
-void meet_and_measure_now(const Crossing* crossings, std::size_t count, unsigned groups,
-                          RayBundle& rays) {
+void meet_and_measure_now(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift,
+                          unsigned groups, RayBundle& rays) {
   for (std::size_t ray = 0; ray < kBundle; ray += hn::Lanes(kTag)) {
     if (!takes_part(groups, ray)) continue;
     Vector low = hn::Load(kTag, rays.low + ray), high = hn::Load(kTag, rays.high + ray);
@@ -58,7 +60,8 @@ void meet_and_measure_now(const Crossing* crossings, std::size_t count, unsigned
     const Vector number = hn::Iota(kTag, static_cast<float>(ray));
     for (std::size_t i = 0; i < count; ++i) {
       const Crossing& c = crossings[i];
-      const Vector a = hn::LoadU(kTag, c.a + ray), difference = hn::LoadU(kTag, c.b + ray) - a;
+      const Vector a = hn::LoadU(kTag, c.a + shift + ray);
+      const Vector difference = hn::LoadU(kTag, c.b + shift + ray) - a;
       const Vector share = value(c.share) + value(c.share_step) * number;
       const Vector inverse = value(c.inverse_run) + value(c.inverse_run_step) * number;
       const Vector slope = ((a - eye) + share * difference) * inverse;
@@ -245,13 +248,14 @@ constexpr float kGroundBound = -1e29F, kVoidBound = -1.5e30F;
 
 }  // namespace
 
-void meet(const Crossing* crossings, std::size_t count, unsigned groups, RayBundle& rays) {
-  HWY_DYNAMIC_DISPATCH(meet_now)(crossings, count, groups, rays);
+void meet(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift, unsigned groups,
+          RayBundle& rays) {
+  HWY_DYNAMIC_DISPATCH(meet_now)(crossings, count, shift, groups, rays);
 }
 
-void meet_and_measure(const Crossing* crossings, std::size_t count, unsigned groups,
-                      RayBundle& rays) {
-  HWY_DYNAMIC_DISPATCH(meet_and_measure_now)(crossings, count, groups, rays);
+void meet_and_measure(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift,
+                      unsigned groups, RayBundle& rays) {
+  HWY_DYNAMIC_DISPATCH(meet_and_measure_now)(crossings, count, shift, groups, rays);
 }
 
 void meet_high(const PossibleCrossing& crossing, unsigned groups, RayBundle& rays) {

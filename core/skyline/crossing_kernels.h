@@ -9,7 +9,7 @@ namespace scarp {
 /// groups of kGroup. Each is written once in vectors of any length (Highway), compiled for several
 /// instruction sets, and the processor chooses at run time. Every operation is rounded by itself
 /// and the only reductions are maxima, so that all of them give the same bits.
-inline constexpr std::int32_t kBundle = 64, kGroup = 16, kGroups = kBundle / kGroup;
+inline constexpr std::int32_t kBundle = 256, kGroup = 16, kGroups = kBundle / kGroup;
 
 /// Rays of neighbouring cells and what is known of their horizons, as slopes.
 struct RayBundle {
@@ -36,12 +36,14 @@ struct Crossing {
 };
 
 /// Compares rays with segments: low and high rise to the slopes at which the ground is seen.
+/// @param shift   added to all samples
 /// @param groups  bit g: the rays of group g take part
-void meet(const Crossing* crossings, std::size_t count, unsigned groups, RayBundle& rays);
+void meet(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift, unsigned groups,
+          RayBundle& rays);
 
 /// The same and notes in `run` where high is met. Cost: 1.5 times as much.
-void meet_and_measure(const Crossing* crossings, std::size_t count, unsigned groups,
-                      RayBundle& rays);
+void meet_and_measure(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift,
+                      unsigned groups, RayBundle& rays);
 
 /// A segment that rays may cross, at a share known within `reach`, or not at all.
 struct PossibleCrossing {

@@ -11,13 +11,13 @@ namespace scarp {
 namespace {
 
 /// Lines that every ray crosses one by one; then squares take over.
-constexpr std::int32_t kNearLines = 24;
+constexpr std::int32_t kNearLines = 12;
 
 /// Squares are asked first as large as this share of their distance.
 constexpr std::int32_t kDistanceInSquares = 2;
 
 /// Beforehand, lines are crossed this share of their distance apart.
-constexpr std::int32_t kDistanceInSteps = 10;
+constexpr std::int32_t kDistanceInSteps = 6;
 
 constexpr unsigned kAllGroups = (1U << kGroups) - 1;
 
@@ -53,6 +53,10 @@ class BundleMarch {
     turn_ = fan_.turn.at(p, q);
     stripe_slack_ = exact_ ? 0 : std::abs(fan_.turn.per_line) * (lines - 1) / 2;
     ++stripe_;
+    first_line_ = first_line;
+    near_.clear();
+    near_end_.assign(1, 0);
+    unsure_.clear();
   }
 
   /// Requires rays with eyes, from the stripe's first lane on.
@@ -63,7 +67,10 @@ class BundleMarch {
     if (reach_ < 1) return;
     notes_void_ = ground_.has_void();
     const std::int32_t near = last_near_line();
-    cross_lines(1, near, kAllGroups);
+    if (notes_void_)
+      cross_lines(1, near, kAllGroups);
+    else
+      cross_near(near);
     cross_some(near + 1);
     list_squares(near + 1);
     for (const Span& span : spans_) search_span(span, kAllGroups);
@@ -99,6 +106,36 @@ class BundleMarch {
   bool begins_block(std::int32_t k, int level) const {
     const std::int32_t line = line_at(k) + (fan_.line_step > 0 ? 0 : 1);
     return (line & ((1 << level) - 1)) == 0;
+  }
+
+  /// The first lines, at once for all that all bundles of the stripe have alike.
+  void cross_near(std::int32_t near) {
+    const std::int32_t last = std::min(near + 1, reach_);
+    for (auto k = static_cast<std::int32_t>(near_end_.size()); k <= last; ++k) {
+      const Step& step = step_at(k);
+      const std::ptrdiff_t shift = (first_line_ - step.line) * ground_.stride();
+      const auto keep = [&](const Crossing& crossing) {
+        near_.push_back(crossing);
+        near_.back().a += shift;
+        near_.back().b += shift;
+      };
+      if (step.is_between_sure) std::for_each_n(step.between.begin(), step.betweens, keep);
+      if (step.is_line_sure) keep(step.at_line);
+      if (!step.is_between_sure || !step.is_line_sure) unsure_.push_back(k);
+      near_end_.push_back(near_.size());
+    }
+    const std::size_t count = near_end_[static_cast<std::size_t>(last)];
+    const std::ptrdiff_t shift = (line_ - first_line_) * ground_.stride();
+    if (search_.measures_distance)
+      meet_and_measure(near_.data(), count, shift, kAllGroups, *rays_);
+    else
+      meet(near_.data(), count, shift, kAllGroups, *rays_);
+    for (const std::int32_t k : unsure_) {
+      if (k > last) break;
+      const Step& step = step_at(k);
+      if (!step.is_between_sure) cross_between(k, kAllGroups);
+      if (!step.is_line_sure) cross_line(k, kAllGroups);
+    }
   }
 
   /// Some lines at growing distances, so that low bounds are good before squares are asked. They
@@ -238,9 +275,7 @@ class BundleMarch {
     step.is_between_sure = make_between(k, step);
     return step;
   }
-  std::ptrdiff_t shift_of(const Step& step) const {
-    return (line_ - step.line) * ground_.stride();
-  }
+  std::ptrdiff_t shift_of(const Step& step) const { return (line_ - step.line) * ground_.stride(); }
 
   void cross_line(std::int32_t k, unsigned groups) {
     const Step& step = step_at(k);
@@ -409,9 +444,9 @@ class BundleMarch {
   }
   void flush(unsigned groups) {
     if (search_.measures_distance)
-      meet_and_measure(crossings_.data(), count_, groups, *rays_);
+      meet_and_measure(crossings_.data(), count_, 0, groups, *rays_);
     else
-      meet(crossings_.data(), count_, groups, *rays_);
+      meet(crossings_.data(), count_, 0, groups, *rays_);
     count_ = 0;
   }
   void add_possible(const PossibleCrossing& crossing, unsigned groups) {
@@ -434,6 +469,10 @@ class BundleMarch {
   double turn_ = 0, stripe_slack_ = 0;
   std::int32_t stripe_ = 0;
   std::vector<Step> steps_;  ///< by line crossed
+  std::int32_t first_line_ = 0;
+  std::vector<Crossing> near_;         ///< of the stripe's first line
+  std::vector<std::size_t> near_end_;  ///< in near_, by line crossed
+  std::vector<std::int32_t> unsure_;   ///< lines crossed that near_ does not have whole
   RayBundle* rays_ = nullptr;
   std::vector<Span> spans_;
   std::array<Crossing, 64> crossings_;

@@ -31,7 +31,7 @@ class MarchGround {
   static constexpr bool is_void(float z) { return z < -1.5e30F; }
 
   /// Lanes beyond either border that may be read: kNothing.
-  static constexpr std::int32_t kPad = 80;
+  static constexpr std::int32_t kPad = 272;
   static constexpr int kLeastLevel = 3;  ///< of squares: 8 samples
 
   MarchGround(const GroundGrid& grid, March march);
