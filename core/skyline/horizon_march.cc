@@ -11,13 +11,13 @@ namespace scarp {
 namespace {
 
 /// Lines that every ray crosses one by one; then squares take over.
-constexpr std::int32_t kNearLines = 12;
+constexpr std::int32_t kNearLines = 16;
 
 /// Squares are asked first as large as this share of their distance.
 constexpr std::int32_t kDistanceInSquares = 2;
 
 /// Beforehand, lines are crossed this share of their distance apart.
-constexpr std::int32_t kDistanceInSteps = 6;
+constexpr std::int32_t kDistanceInSteps = 8;
 
 constexpr unsigned kAllGroups = (1U << kGroups) - 1;
 

@@ -36,6 +36,8 @@ LayerData data_of(const LayerSamples& samples) {
     return {GDT_Int32, start(*ints), ints->size(), false, "YES"};
   if (const auto* counts = std::get_if<std::span<const std::uint32_t>>(&samples))
     return {GDT_UInt32, start(*counts), counts->size(), false, "YES"};
+  if (const auto* halves = std::get_if<std::span<const std::int16_t>>(&samples))
+    return {GDT_Int16, start(*halves), halves->size(), false, "YES"};
   const auto& floats = std::get<std::span<const float>>(samples);
   return {GDT_Float32, start(floats), floats.size(), true, "YES"};
 }
@@ -48,9 +50,17 @@ GDALDatasetUniquePtr memory_dataset(const RasterLayer& layer, const LayerData& d
   GDALDatasetUniquePtr dataset(
       driver->Create("", layer.columns, layer.rows, 0, data.type, nullptr));
   if (!dataset) session.fail(path);
-  CPLStringList options;
-  options.SetNameValue("DATAPOINTER", fmt::format("{}", fmt::ptr(data.start)).c_str());
-  if (dataset->AddBand(data.type, options.List()) != CE_None) session.fail(path);
+  const auto add_band = [&](void* start) {
+    CPLStringList options;
+    options.SetNameValue("DATAPOINTER", fmt::format("{}", fmt::ptr(start)).c_str());
+    if (dataset->AddBand(data.type, options.List()) != CE_None) session.fail(path);
+  };
+  add_band(data.start);
+  for (const RasterBand& band : layer.more_bands) {
+    const LayerData more = data_of(band.samples);
+    assert(more.type == data.type && more.count == data.count);
+    add_band(more.start);
+  }
   return dataset;
 }
 
@@ -72,10 +82,16 @@ void describe(GDALDataset& dataset, const RasterLayer& layer) {
   dataset.SetGeoTransform(geotransform.data());
   for (const auto& [key, value] : layer.metadata)
     dataset.SetMetadataItem(key.c_str(), value.c_str());
+  for (int i = 1; i <= dataset.GetRasterCount(); ++i) {
+    GDALRasterBand& band = *dataset.GetRasterBand(i);
+    const std::string& name =
+        i == 1 ? layer.band_name : layer.more_bands[static_cast<std::size_t>(i) - 2].name;
+    if (!name.empty()) band.SetDescription(name.c_str());
+    if (!layer.unit.empty()) band.SetUnitType(layer.unit.c_str());
+    if (layer.nodata) band.SetNoDataValue(*layer.nodata);
+    if (layer.scale != 1) band.SetScale(layer.scale);
+  }
   GDALRasterBand& band = *dataset.GetRasterBand(1);
-  if (!layer.band_name.empty()) band.SetDescription(layer.band_name.c_str());
-  if (!layer.unit.empty()) band.SetUnitType(layer.unit.c_str());
-  if (layer.nodata) band.SetNoDataValue(*layer.nodata);
   if (layer.colours.empty()) return;
   GDALColorTable table;
   for (std::size_t i = 0; i < layer.colours.size(); ++i) {
@@ -106,7 +122,8 @@ void write_geotiff_cog(const std::string& path, const RasterLayer& layer, Existi
   build_overviews(*source, data);
   session.check(path);
   CPLStringList options;
-  options.SetNameValue("COMPRESS", "DEFLATE");
+  options.SetNameValue("COMPRESS", layer.is_bulky ? "ZSTD" : "DEFLATE");
+  if (layer.is_bulky) options.SetNameValue("LEVEL", "1");
   options.SetNameValue("PREDICTOR", data.predictor);
   options.SetNameValue("BIGTIFF", "IF_SAFER");
   options.SetNameValue("NUM_THREADS", std::to_string(thread_count()).c_str());
