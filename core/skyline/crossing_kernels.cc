@@ -18,7 +18,7 @@ using Tag = hn::CappedTag<float, kGroup>;
 using Vector = hn::Vec<Tag>;
 using Mask = hn::Mask<Tag>;
 constexpr Tag kTag;
-constexpr float kGroundBound = -1e29F;
+constexpr float kGroundBound = -1e29F, kVoidBound = -1.5e30F;
 
 HWY_INLINE Vector value(float v) {
   return hn::Set(kTag, v);
@@ -163,6 +163,54 @@ unsigned may_block_now(const Square& square, float tolerance, unsigned groups, R
   return open;
 }
 
+/// Known ground and void that rays meet, in this order.
+HWY_INLINE void note(Mask known, Mask is_void, std::size_t ray, RayBundle& rays) {
+  const Vector over = hn::Load(kTag, rays.over_void + ray);
+  const Vector before = hn::Load(kTag, rays.void_before + ray);
+  hn::Store(hn::Max(before, hn::IfThenElseZero(known, over)), kTag, rays.void_before + ray);
+  hn::Store(hn::IfThenElse(is_void, value(1), over), kTag, rays.over_void + ray);
+}
+
+void note_void_now(const float* a, const float* b, unsigned groups, RayBundle& rays) {
+  const Vector ground = value(kGroundBound), missing = value(kVoidBound);
+  for (std::size_t ray = 0; ray < kBundle; ray += hn::Lanes(kTag)) {
+    if (!takes_part(groups, ray)) continue;
+    const Vector lower = hn::Min(hn::LoadU(kTag, a + ray), hn::LoadU(kTag, b + ray));
+    note(lower > ground, lower < missing, ray, rays);
+  }
+}
+
+void note_void_loosely_now(const LooseCrossing& c, RayBundle& rays) {
+  const Vector ground = value(kGroundBound), missing = value(kVoidBound);
+  const std::size_t lanes = hn::Lanes(kTag);
+  const auto end = static_cast<std::size_t>(c.end_ray);
+  for (std::size_t ray = static_cast<std::size_t>(c.first_ray) / lanes * lanes; ray < end;
+       ray += lanes) {
+    const Vector number = hn::Iota(kTag, static_cast<float>(ray));
+    const Mask taken = hn::And(number >= value(static_cast<float>(c.first_ray)),
+                               number < value(static_cast<float>(c.end_ray)));
+    const Vector place = value(c.place) + value(c.place_step) * number;
+    const Mask left = place<value(1 + c.reach), right = place> value(1 - c.reach);
+    const Vector z0 = hn::LoadU(kTag, c.z + ray), z1 = hn::LoadU(kTag, c.z + ray + 1);
+    const Vector z2 = hn::LoadU(kTag, c.z + ray + 2);
+    const Vector beside = hn::Min(hn::IfThenElse(left, z0, z1), hn::IfThenElse(right, z2, z1));
+    const Vector lower = hn::Min(z1, beside);
+    const Vector end_beside = hn::IfThenElse(left, z0, z2);
+    note(hn::And(taken, hn::Min(z1, end_beside) > ground), hn::And(taken, lower < missing), ray,
+         rays);
+  }
+}
+
+void note_ground_behind_now(const Square& square, unsigned groups, RayBundle& rays) {
+  for (std::size_t ray = 0; ray < kBundle; ray += hn::Lanes(kTag)) {
+    if (!takes_part(groups, ray)) continue;
+    Vector most = hn::LoadU(kTag, square.highest[0] + ray);
+    for (int i = 1; i < square.count; ++i)
+      most = hn::Max(most, hn::LoadU(kTag, square.highest[i] + ray));
+    note(most > value(kGroundBound), most > value(1e30F), ray, rays);
+  }
+}
+
 /// Arc tangent in steps of 0.01 degree, error below 0.004 of them.
 /// Source: Cephes atanf (Moshier), reduction at tan(pi/8) and tan(3 pi/8).
 HWY_INLINE Vector arc_tangent_steps(Vector x) {
@@ -207,8 +255,9 @@ void elevations_now(const ElevationRow& k, const RayBundle& rays, std::int16_t* 
     const Mask met = most > none, met_low = ray_low > none;
     const Vector low = clamped(ray_low * shrink - value(k.slope_error));
     const Vector high = clamped(most * shrink + value(k.slope_error));
-    const Vector middle =
-        clamped(hn::IfThenElse(met_low, (ray_low + ray_high) * value(0.5F), ray_high) * shrink);
+    // Of what was compared; its bounds are almost equal, but where it is not certain that some of
+    // it is met, and then it most often is.
+    const Vector middle = clamped(ray_high * shrink);
     const auto tangent = [&](Vector s) { return level + s * (rise + s * value(k.bend)); };
     const Vector low_tangent = tangent(low) - value(k.error) * (one + low * low);
     const Vector high_tangent = tangent(high) + value(k.error) * (one + high * high);
@@ -241,12 +290,9 @@ HWY_EXPORT(meet_high_now);
 HWY_EXPORT(meet_loosely_now);
 HWY_EXPORT(may_block_now);
 HWY_EXPORT(elevations_now);
-
-namespace {
-
-constexpr float kGroundBound = -1e29F, kVoidBound = -1.5e30F;
-
-}  // namespace
+HWY_EXPORT(note_void_now);
+HWY_EXPORT(note_void_loosely_now);
+HWY_EXPORT(note_ground_behind_now);
 
 void meet(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift, unsigned groups,
           RayBundle& rays) {
@@ -274,41 +320,19 @@ void elevations(const ElevationRow& row, const RayBundle& rays, std::int16_t* es
                 std::int16_t* lower, std::int16_t* upper) {
   HWY_DYNAMIC_DISPATCH(elevations_now)(row, rays, estimate, lower, upper);
   for (int i = 0; i < kBundle; ++i)
-    if (rays.void_before[i] != 0) estimate[i] = lower[i] = upper[i] = kUnknownElevation;
+    if (rays.void_before[i] > 0) estimate[i] = lower[i] = upper[i] = kUnknownElevation;
 }
 
-void note_void(const float* first, const float* second, unsigned groups, RayBundle& rays) {
-  for (int lane = 0; lane < kBundle; ++lane) {
-    const bool taken = (groups >> (lane / kGroup) & 1) != 0;
-    const float a = first[lane], b = second[lane];
-    const bool is_void = taken && (a < kVoidBound || b < kVoidBound);
-    const bool known = taken && a > kGroundBound && b > kGroundBound;
-    rays.void_before[lane] = rays.void_before[lane] | (known ? rays.over_void[lane] : 0);
-    rays.over_void[lane] = rays.over_void[lane] | (is_void ? 1 : 0);
-  }
+void note_void(const float* a, const float* b, unsigned groups, RayBundle& rays) {
+  HWY_DYNAMIC_DISPATCH(note_void_now)(a, b, groups, rays);
 }
 
 void note_void_loosely(const LooseCrossing& crossing, RayBundle& rays) {
-  const LooseCrossing c = crossing;
-  for (int ray = c.first_ray; ray < c.end_ray; ++ray) {
-    const float place = c.place + static_cast<float>(ray) * c.place_step;
-    const bool left = place<1 + c.reach, right = place> 1 - c.reach;
-    const float z0 = c.z[ray], z1 = c.z[ray + 1], z2 = c.z[ray + 2];
-    const bool is_void = z1 < kVoidBound || (left && z0 < kVoidBound) || (right && z2 < kVoidBound);
-    const bool known = z1 > kGroundBound && (left ? z0 > kGroundBound : z2 > kGroundBound);
-    rays.void_before[ray] = rays.void_before[ray] | (known ? rays.over_void[ray] : 0);
-    rays.over_void[ray] = rays.over_void[ray] | (is_void ? 1 : 0);
-  }
+  HWY_DYNAMIC_DISPATCH(note_void_loosely_now)(crossing, rays);
 }
 
 void note_ground_behind(const Square& square, unsigned groups, RayBundle& rays) {
-  for (int i = 0; i < square.count; ++i) {
-    const float* highest = square.highest[i];
-    for (int lane = 0; lane < kBundle; ++lane) {
-      const bool known = (groups >> (lane / kGroup) & 1) != 0 && highest[lane] > kGroundBound;
-      rays.void_before[lane] = rays.void_before[lane] | (known ? rays.over_void[lane] : 0);
-    }
-  }
+  HWY_DYNAMIC_DISPATCH(note_ground_behind_now)(square, groups, rays);
 }
 
 }  // namespace scarp

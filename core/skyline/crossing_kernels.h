@@ -16,12 +16,12 @@ struct RayBundle {
   static constexpr float kNone = -1e15F;  ///< slopes below are of no ground at all
 
   alignas(64) float eye_z[kBundle];
-  alignas(64) float low[kBundle];   ///< never above the horizon
-  alignas(64) float high[kBundle];  ///< never below what was compared exactly
-  alignas(64) float rest[kBundle];  ///< never below what was left out
-  alignas(64) float run[kBundle];   ///< where `high` was met, metres; only with distances
-  alignas(64) std::uint8_t over_void[kBundle];    ///< void met so far
-  alignas(64) std::uint8_t void_before[kBundle];  ///< ... with known ground behind
+  alignas(64) float low[kBundle];          ///< never above the horizon
+  alignas(64) float high[kBundle];         ///< never below what was compared exactly
+  alignas(64) float rest[kBundle];         ///< never below what was left out
+  alignas(64) float run[kBundle];          ///< where `high` was met, metres; only with distances
+  alignas(64) float over_void[kBundle];    ///< 1: void was met so far
+  alignas(64) float void_before[kBundle];  ///< 1: ... and known ground behind it
 };
 
 /// A grid segment from a to b, which the rays of a bundle cross at `share` of it, the i-th ray at

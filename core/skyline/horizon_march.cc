@@ -237,7 +237,7 @@ class BundleMarch {
       bool found = false;
       for (int i = 0; i < square.count; ++i)
         for (int ray = g * kGroup; ray < (g + 1) * kGroup; ++ray)
-          found |= any_void[square.highest[i] - highest + ray] != 0 && rays_->void_before[ray] == 0;
+          found |= any_void[square.highest[i] - highest + ray] != 0 && rays_->void_before[ray] <= 0;
       if (found) open |= 1U << g & groups;
     }
     note_ground_behind(square, groups & ~open, *rays_);
