@@ -106,6 +106,11 @@ class AllHorizonsRun {
     samples_ = static_cast<std::size_t>(ground_.grid.columns()) *
                static_cast<std::size_t>(ground_.grid.rows());
     earth_ = ground_.dem.frame->earth_frame();
+    if (const double side_m = cell_side_m(ground_.grid); side_m < kLeastCellM)
+      throw Error(ErrorCode::kInput,
+                  fmt::format("'{}': cells are {:.2g} m wide; at least {} m were expected; if they "
+                              "are in degrees, give the data a CRS",
+                              options_.sources.front(), side_m, kLeastCellM));
     if (options_.sun_days && !earth_)
       throw Error(
           ErrorCode::kInput,

@@ -64,16 +64,6 @@ class PlanMap {
     return difference(at(lane, from), at(lane, from + 1));
   }
 
-  /// How far verticals lean at most.
-  double greatest_tilt() const {
-    const auto* blocks = std::get_if<BlockPlacement>(&grid_.placement());
-    double most = 0;
-    if (!blocks) return most;
-    for (const BlockPlacement::Block& block : blocks->blocks)
-      most = std::max(
-          most, std::hypot(block[BlockPlacement::kTiltX][0], block[BlockPlacement::kTiltY][0]));
-    return most * 1.1;
-  }
   double seam_m() const {
     return std::holds_alternative<BlockPlacement>(grid_.placement()) ? kBlockSeamM : 0;
   }
@@ -160,9 +150,10 @@ struct Polynomial {
 /// Makes a fan in steps that share much.
 class FanMaker {
  public:
-  FanMaker(const GroundGrid& grid, const std::optional<EarthFrame>& earth, March march,
+  FanMaker(const GroundGrid& grid, const std::optional<EarthFrame>& earth, double tilt, March march,
            const MarchTile& tile, const AzimuthAt& azimuth)
       : earth_(earth),
+        tilt_(tilt),
         map_(grid, march),
         tile_(tile),
         azimuth_(azimuth),
@@ -301,11 +292,10 @@ class FanMaker {
         }
       }
     }
-    const double tilt = map_.greatest_tilt();
     if (!is_exact())
-      fan_.slack_rate = 2 * rate + 1e-9 + kSteepestLean * tilt * line_run_m_ / lane_m_;
+      fan_.slack_rate = 2 * rate + 1e-9 + kSteepestLean * tilt_ * line_run_m_ / lane_m_;
     // |s| share <= (1 + s^2) share / 2; a lean moves what is seen to and fro as well.
-    fan_.tangent_error = run_share + rounding_m / line_run_m_ / 2 + tilt + 3e-7;
+    fan_.tangent_error = run_share + rounding_m / line_run_m_ / 2 + tilt_ + 3e-7;
   }
 
   /// tan(elevation) as level + s rise + s^2 bend, at a place of the map and a height over it.
@@ -373,6 +363,7 @@ class FanMaker {
   }
 
   const std::optional<EarthFrame>& earth_;
+  const double tilt_;
   const PlanMap map_;
   const MarchTile& tile_;
   const AzimuthAt& azimuth_;
@@ -395,9 +386,20 @@ double runs_along(const GroundGrid& grid, const std::optional<EarthFrame>& earth
   return std::abs(course[0] / course[1]);
 }
 
-RayFan ray_fan(const GroundGrid& grid, const std::optional<EarthFrame>& earth, March march,
-               const MarchTile& tile, const AzimuthAt& azimuth) {
-  return FanMaker(grid, earth, march, tile, azimuth).make();
+double greatest_tilt(const GroundGrid& grid) {
+  double most = 0;
+  if (const auto* blocks = std::get_if<BlockPlacement>(&grid.placement()))
+    for (const BlockPlacement::Block& block : blocks->blocks)
+      most = std::max(
+          most, std::hypot(block[BlockPlacement::kTiltX][0], block[BlockPlacement::kTiltY][0]));
+  // The constants are those of the blocks' middles.
+  constexpr double kBeyondMiddle = 1.1;
+  return most * kBeyondMiddle;
+}
+
+RayFan ray_fan(const GroundGrid& grid, const std::optional<EarthFrame>& earth, double tilt,
+               March march, const MarchTile& tile, const AzimuthAt& azimuth) {
+  return FanMaker(grid, earth, tilt, march, tile, azimuth).make();
 }
 
 }  // namespace scarp

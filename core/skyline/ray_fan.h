@@ -66,8 +66,16 @@ inline constexpr double kMostAlong = 1.5;
 double runs_along(const GroundGrid& grid, const std::optional<EarthFrame>& earth, March march,
                   const MarchTile& tile, const AzimuthAt& azimuth);
 
-/// Requires runs_along of at most kMostAlong. Cost: about 20 microseconds and O(lines).
-RayFan ray_fan(const GroundGrid& grid, const std::optional<EarthFrame>& earth, March march,
-               const MarchTile& tile, const AzimuthAt& azimuth);
+/// How far the verticals of a grid lean at most.
+double greatest_tilt(const GroundGrid& grid);
+
+/// Cells below this are no wider than a few steps of the lattice, and no fan holds, metres.
+inline constexpr double kLeastCellM = 0.02;
+
+/// Requires runs_along of at most kMostAlong and cells of at least kLeastCellM.
+/// @param tilt  greatest_tilt
+/// Cost: about 50 microseconds and O(lines).
+RayFan ray_fan(const GroundGrid& grid, const std::optional<EarthFrame>& earth, double tilt,
+               March march, const MarchTile& tile, const AzimuthAt& azimuth);
 
 }  // namespace scarp

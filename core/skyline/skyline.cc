@@ -47,6 +47,10 @@ MarchTile turned(const MarchTile& tile) {
 
 }  // namespace
 
+double cell_side_m(const GroundGrid& grid) {
+  return std::min(spacing_m(grid, true), spacing_m(grid, false));
+}
+
 AzimuthAt fixed_azimuth(double azimuth_rad) {
   return [azimuth_rad](const EyeBearings&) { return azimuth_rad; };
 }
@@ -59,8 +63,9 @@ struct Skyline::Part {
 
 Skyline::Skyline(const GroundGrid& grid, const std::optional<EarthFrame>& earth,
                  const SkylineOptions& options)
-    : grid_(grid), earth_(earth), options_(options) {
+    : grid_(grid), earth_(earth), options_(options), tilt_(greatest_tilt(grid)) {
   assert(grid.columns() >= 2 && grid.rows() >= 2);
+  assert(cell_side_m(grid) >= kLeastCellM);
 }
 
 March Skyline::march_for(const AzimuthAt& azimuth) const {
@@ -114,7 +119,7 @@ void Skyline::look(const AzimuthAt& azimuth, const SkylineBands& bands) {
 
 void Skyline::look_from(const Part& part, const MarchGround& ground, const AzimuthAt& azimuth,
                         const SkylineBands& bands) const {
-  const RayFan fan = ray_fan(grid_, earth_, part.march, part.tile, azimuth);
+  const RayFan fan = ray_fan(grid_, earth_, tilt_, part.march, part.tile, azimuth);
   MarchSearch search;
   search.tolerance = static_cast<float>(options_.tolerance_rad);
   search.eye_height_m = options_.eye_height_m;

@@ -38,7 +38,7 @@ struct SkylineBands {
 /// Memory: the grid's 4 bytes a sample, 5 more (6 where there is void), and the bands.
 class Skyline {
  public:
-  /// grid is kept by reference. Requires at least 2 x 2 samples.
+  /// grid is kept by reference. Requires at least 2 x 2 samples, kLeastCellM apart or more.
   Skyline(const GroundGrid& grid, const std::optional<EarthFrame>& earth,
           const SkylineOptions& options);
 
@@ -59,8 +59,12 @@ class Skyline {
   const GroundGrid& grid_;
   std::optional<EarthFrame> earth_;
   SkylineOptions options_;
+  double tilt_;
   std::unique_ptr<MarchGround> over_rows_, over_columns_;
 };
+
+/// The distance between neighbouring samples, the lesser of both ways, in the middle of the grid.
+double cell_side_m(const GroundGrid& grid);
 
 /// An azimuth that is the same from everywhere, radians.
 AzimuthAt fixed_azimuth(double azimuth_rad);

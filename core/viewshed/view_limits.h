@@ -48,7 +48,7 @@ class EyeBearings {
   double apparent_pitch_rad(const Position& target) const;
   /// Direction in the frame's plane, radians counter-clockwise from +x, in which an azimuth leaves
   /// the eye: that of the vertical plane, radians clockwise from true north (from grid north on the
-  /// flat earth). Error below 1e-8 rad.
+  /// flat earth). Within 1e-6 rad of the geodesic's.
   double plane_direction_rad(double azimuth_rad) const;
   /// Where an infinitely far point lies in the sky. @param ecef  unit vector towards it
   /// On the flat earth the vector's components are east, north and up.
