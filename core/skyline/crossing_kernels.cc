@@ -23,6 +23,11 @@ constexpr float kGroundBound = -1e29F, kVoidBound = -1.5e30F;
 HWY_INLINE Vector value(float v) {
   return hn::Set(kTag, v);
 }
+/// Magnitude of a rise between samples; 0 where one of them is no ground.
+HWY_INLINE Vector steepness(Vector difference) {
+  const Vector magnitude = hn::Abs(difference);
+  return hn::IfThenElseZero(magnitude < value(-kGroundBound), magnitude);
+}
 HWY_INLINE bool takes_part(unsigned groups, std::size_t ray) {
   return (groups >> (ray / kGroup) & 1) != 0;
 }
@@ -31,7 +36,7 @@ void meet_now(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift
               RayBundle& rays) {
   for (std::size_t ray = 0; ray < kBundle; ray += hn::Lanes(kTag)) {
     if (!takes_part(groups, ray)) continue;
-    Vector low = hn::Load(kTag, rays.low + ray), high = hn::Load(kTag, rays.high + ray);
+    Vector greatest = hn::Load(kTag, rays.slope + ray), error = hn::Load(kTag, rays.error + ray);
     const Vector eye = hn::Load(kTag, rays.eye_z + ray);
     const Vector number = hn::Iota(kTag, static_cast<float>(ray));
     for (std::size_t i = 0; i < count; ++i) {
@@ -40,13 +45,11 @@ void meet_now(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift
       const Vector difference = hn::LoadU(kTag, c.b + shift + ray) - a;
       const Vector share = value(c.share) + value(c.share_step) * number;
       const Vector inverse = value(c.inverse_run) + value(c.inverse_run_step) * number;
-      const Vector slope = ((a - eye) + share * difference) * inverse;
-      const Vector error = hn::Abs(difference) * value(c.slack) + hn::Abs(slope) * value(c.drift);
-      low = hn::Max(low, slope - error);
-      high = hn::Max(high, slope + error);
+      greatest = hn::Max(greatest, ((a - eye) + share * difference) * inverse);
+      error = hn::Max(error, steepness(difference) * value(c.slack));
     }
-    hn::Store(low, kTag, rays.low + ray);
-    hn::Store(high, kTag, rays.high + ray);
+    hn::Store(greatest, kTag, rays.slope + ray);
+    hn::Store(error, kTag, rays.error + ray);
   }
 }
 
@@ -54,8 +57,8 @@ void meet_and_measure_now(const Crossing* crossings, std::size_t count, std::ptr
                           unsigned groups, RayBundle& rays) {
   for (std::size_t ray = 0; ray < kBundle; ray += hn::Lanes(kTag)) {
     if (!takes_part(groups, ray)) continue;
-    Vector low = hn::Load(kTag, rays.low + ray), high = hn::Load(kTag, rays.high + ray);
-    Vector run = hn::Load(kTag, rays.run + ray);
+    Vector greatest = hn::Load(kTag, rays.slope + ray), error = hn::Load(kTag, rays.error + ray);
+    Vector run = hn::Load(kTag, rays.slope_run + ray);
     const Vector eye = hn::Load(kTag, rays.eye_z + ray);
     const Vector number = hn::Iota(kTag, static_cast<float>(ray));
     for (std::size_t i = 0; i < count; ++i) {
@@ -65,14 +68,13 @@ void meet_and_measure_now(const Crossing* crossings, std::size_t count, std::ptr
       const Vector share = value(c.share) + value(c.share_step) * number;
       const Vector inverse = value(c.inverse_run) + value(c.inverse_run_step) * number;
       const Vector slope = ((a - eye) + share * difference) * inverse;
-      const Vector error = hn::Abs(difference) * value(c.slack) + hn::Abs(slope) * value(c.drift);
-      run = hn::IfThenElse(high < slope + error, value(1 / c.inverse_run), run);
-      low = hn::Max(low, slope - error);
-      high = hn::Max(high, slope + error);
+      run = hn::IfThenElse(greatest < slope, value(1 / c.inverse_run), run);
+      greatest = hn::Max(greatest, slope);
+      error = hn::Max(error, steepness(difference) * value(c.slack));
     }
-    hn::Store(run, kTag, rays.run + ray);
-    hn::Store(low, kTag, rays.low + ray);
-    hn::Store(high, kTag, rays.high + ray);
+    hn::Store(run, kTag, rays.slope_run + ray);
+    hn::Store(greatest, kTag, rays.slope + ray);
+    hn::Store(error, kTag, rays.error + ray);
   }
 }
 
@@ -153,7 +155,9 @@ unsigned may_block_now(const Square& square, float tolerance, unsigned groups, R
     const Vector slope =
         hn::Max(rise * value(square.inverse_near), rise * value(square.inverse_far));
     const Vector least =
-        hn::Max(hn::Load(kTag, rays.low + ray) + value(tolerance), value(RayBundle::kNone));
+        hn::Max(hn::Max(hn::Load(kTag, rays.low + ray), hn::Load(kTag, rays.slope + ray)) +
+                    value(tolerance),
+                value(RayBundle::kNone));
     hn::Store(hn::Max(hn::Load(kTag, rays.rest + ray), slope), kTag, raised + ray);
     if (!hn::AllFalse(kTag, slope > least)) open |= 1U << (ray / kGroup);
   }
@@ -250,14 +254,18 @@ void elevations_now(const ElevationRow& k, const RayBundle& rays, std::int16_t* 
     const Vector level = value(k.level) + number * value(k.level_step) + z * value(k.level_z);
     const Vector rise = value(k.rise) + number * value(k.rise_step) + z * value(k.rise_z);
     const Vector shrink = value(k.shrink) + number * value(k.shrink_step);
-    const Vector ray_low = hn::Load(kTag, rays.low + i), ray_high = hn::Load(kTag, rays.high + i);
+    const Vector slope = hn::Load(kTag, rays.slope + i);
+    const Vector error = hn::Load(kTag, rays.error + i) + hn::Abs(slope) * value(k.drift);
+    const Vector ray_low = hn::Max(hn::Load(kTag, rays.low + i), slope - error);
+    const Vector loose_high = hn::Load(kTag, rays.high + i);
+    const Vector ray_high = hn::Max(loose_high, slope + error);
     const Vector most = hn::Max(ray_high, hn::Load(kTag, rays.rest + i));
     const Mask met = most > none, met_low = ray_low > none;
     const Vector low = clamped(ray_low * shrink - value(k.slope_error));
     const Vector high = clamped(most * shrink + value(k.slope_error));
     // Of what was compared; its bounds are almost equal, but where it is not certain that some of
     // it is met, and then it most often is.
-    const Vector middle = clamped(ray_high * shrink);
+    const Vector middle = clamped(hn::Max(loose_high, slope) * shrink);
     const auto tangent = [&](Vector s) { return level + s * (rise + s * value(k.bend)); };
     const Vector low_tangent = tangent(low) - value(k.error) * (one + low * low);
     const Vector high_tangent = tangent(high) + value(k.error) * (one + high * high);

@@ -16,10 +16,17 @@ struct RayBundle {
   static constexpr float kNone = -1e15F;  ///< slopes below are of no ground at all
 
   alignas(64) float eye_z[kBundle];
-  alignas(64) float low[kBundle];          ///< never above the horizon
-  alignas(64) float high[kBundle];         ///< never below what was compared exactly
-  alignas(64) float rest[kBundle];         ///< never below what was left out
-  alignas(64) float run[kBundle];          ///< where `high` was met, metres; only with distances
+  /// Of crossings that are certain: the greatest slope, and the greatest error of any.
+  alignas(64) float slope[kBundle];
+  alignas(64) float error[kBundle];
+  /// Of the others: never above the horizon, and never below what was met of it.
+  alignas(64) float low[kBundle];
+  alignas(64) float high[kBundle];
+  /// Never below what was left out.
+  alignas(64) float rest[kBundle];
+  /// Where slope and high were met, metres; only with distances.
+  alignas(64) float slope_run[kBundle];
+  alignas(64) float run[kBundle];
   alignas(64) float over_void[kBundle];    ///< 1: void was met so far
   alignas(64) float void_before[kBundle];  ///< 1: ... and known ground behind it
 };
@@ -32,16 +39,15 @@ struct Crossing {
   float share, share_step;
   float inverse_run, inverse_run_step;  ///< 1 / metres, of the first ray and from ray to ray
   float slack;                          ///< share's error times inverse_run
-  float drift;                          ///< relative error of the run
 };
 
-/// Compares rays with segments: low and high rise to the slopes at which the ground is seen.
+/// Compares rays with segments: slope and error rise.
 /// @param shift   added to all samples
 /// @param groups  bit g: the rays of group g take part
 void meet(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift, unsigned groups,
           RayBundle& rays);
 
-/// The same and notes in `run` where high is met. Cost: 1.5 times as much.
+/// The same and notes slope_run. Cost: 1.3 times as much.
 void meet_and_measure(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift,
                       unsigned groups, RayBundle& rays);
 
@@ -77,8 +83,8 @@ struct Square {
   float inverse_near, inverse_far;
 };
 
-/// Which groups have a ray that the ground might block more than `tolerance` above its low? The
-/// others' `rest` rises to what the ground can do.
+/// Which groups have a ray that the ground might block more than `tolerance` above what it has met?
+/// The others' `rest` rises to what the ground can do.
 /// @param groups  that are asked
 unsigned may_block(const Square& square, float tolerance, unsigned groups, RayBundle& rays);
 
@@ -94,6 +100,7 @@ struct ElevationRow {
   float shrink, shrink_step;  ///< slopes are multiplied by shrink + i shrink_step
   float error;                ///< tangent_error
   float slope_error;          ///< of the heights' rounding
+  float drift;                ///< relative error of the runs at certain crossings
 };
 
 /// Elevation in steps of 0.01 degree from slopes, rounded down and up.

@@ -34,7 +34,8 @@ class BundleMarch {
         tile_(tile),
         search_(search),
         exact_(fan.slack_fixed == 0 && fan.slack_rate == 0),
-        steps_(fan.place.size()) {}
+        steps_(fan.place.size()),
+        lane_ranges_(fan.place.size()) {}
 
   /// Lines of cells that share the places of their crossings: so many that these are off by
   /// kStripeSlack at most.
@@ -45,6 +46,9 @@ class BundleMarch {
                : std::max(1, static_cast<std::int32_t>(kStripeSlack / change));
   }
 
+  /// Relative error of the runs of the crossings so far in the stripe.
+  double drift() const { return drift_; }
+
   /// Begins a stripe of bundles, one above the other.
   void begin_stripe(std::int32_t lane, std::int32_t first_line, std::int32_t lines) {
     lane_ = lane;
@@ -53,6 +57,7 @@ class BundleMarch {
     turn_ = fan_.turn.at(p, q);
     stripe_slack_ = exact_ ? 0 : std::abs(fan_.turn.per_line) * (lines - 1) / 2;
     ++stripe_;
+    drift_ = 0;
     first_line_ = first_line;
     near_.clear();
     near_end_.assign(1, 0);
@@ -195,16 +200,11 @@ class BundleMarch {
   /// @return false where the rays meet nothing there
   bool make_square(const Span& span, Square& square) const {
     const std::int32_t before = span.first - 1, after = std::min(span.last + 1, fan_.reach());
-    double low = place(before), high = low;
-    for (const double at : {low + place_step(before) * (kBundle - 1), place(after),
-                            place(after) + place_step(after) * (kBundle - 1)}) {
-      low = std::min(low, at);
-      high = std::max(high, at);
-    }
-    const double half = (after - before) / 2.0;
-    const double margin = slack(after) + fan_.bulge * half * half + kNearSample;
-    const auto first = static_cast<std::int32_t>(std::floor(low - margin));
-    const auto last = static_cast<std::int32_t>(std::floor(high + margin)) + 1;
+    const LaneRange &from = lanes_at(before), &to = lanes_at(after);
+    const double half = (after - before) / 2.0, bulge = fan_.bulge * half * half;
+    const std::int32_t more = bulge <= kWindowMargin ? 0 : static_cast<std::int32_t>(bulge) + 1;
+    const std::int32_t first = std::min(from.first, to.first) - more;
+    const std::int32_t last = std::max(from.last, to.last) + more;
     square.count = 0;
     square.inverse_near = static_cast<float>(inverse_run(span.first));
     square.inverse_far = static_cast<float>(inverse_run(span.last));
@@ -220,6 +220,23 @@ class BundleMarch {
     }
     square.count = count;
     return true;
+  }
+
+  /// Samples on either side of all places where the rays cross a line, from the bundle's first
+  /// ray's, with kWindowMargin to spare.
+  struct LaneRange {
+    std::int32_t stripe = 0;
+    std::int32_t first = 0, last = 0;
+  };
+  const LaneRange& lanes_at(std::int32_t k) const {
+    LaneRange& range = lane_ranges_[static_cast<std::size_t>(k)];
+    if (range.stripe == stripe_) return range;
+    const double at = place(k), end = at + place_step(k) * (kBundle - 1);
+    const double margin = slack(k) + kWindowMargin;
+    range.stripe = stripe_;
+    range.first = static_cast<std::int32_t>(std::floor(std::min(at, end) - margin));
+    range.last = static_cast<std::int32_t>(std::floor(std::max(at, end) + margin)) + 1;
+    return range;
   }
 
   /// Lane offsets at which a bundle can be read.
@@ -261,6 +278,7 @@ class BundleMarch {
     bool is_line_sure = false, is_between_sure = false;
     std::int32_t line = 0;  ///< of the bundle that it was made for
     int betweens = 0;
+    double drift = 0;  ///< relative error of the runs between lines
     Crossing at_line;
     std::array<Crossing, 2> between;
   };
@@ -272,7 +290,9 @@ class BundleMarch {
     step.line = line_;
     step.is_line_sure = make_line(k, step);
     step.betweens = 0;
+    step.drift = 0;
     step.is_between_sure = make_between(k, step);
+    if (step.is_between_sure) drift_ = std::max(drift_, step.drift);
     return step;
   }
   std::ptrdiff_t shift_of(const Step& step) const { return (line_ - step.line) * ground_.stride(); }
@@ -302,8 +322,7 @@ class BundleMarch {
                   static_cast<float>(step),
                   static_cast<float>(inverse_run(k)),
                   0,
-                  static_cast<float>(slack_lanes * inverse_run(k)),
-                  0};
+                  static_cast<float>(slack_lanes * inverse_run(k))};
     return true;
   }
 
@@ -397,8 +416,8 @@ class BundleMarch {
           static_cast<float>((found.end - found.at) / (kBundle - 1)),
           static_cast<float>(inverse),
           static_cast<float>((last_inverse - inverse) / (kBundle - 1)),
-          static_cast<float>(found.reach * inverse),
-          static_cast<float>(found.reach / (k - 1 + least))};
+          static_cast<float>(found.reach * inverse)};
+      to.drift = std::max(to.drift, found.reach / (k - 1 + least));
     });
     return is_sure;
   }
@@ -457,6 +476,7 @@ class BundleMarch {
   static constexpr int kMostSquares = 8;
   static constexpr double kSwerveLanes = 64;
   static constexpr double kSureReach = 0.05;
+  static constexpr double kWindowMargin = 1e-3;  ///< lanes
   static constexpr std::int32_t kMostStripeLines = 16;
   static constexpr double kStripeSlack = 4e-5;  ///< lanes per line crossed
 
@@ -468,7 +488,9 @@ class BundleMarch {
   std::int32_t lane_ = 0, line_ = 0, reach_ = 0;
   double turn_ = 0, stripe_slack_ = 0;
   std::int32_t stripe_ = 0;
+  double drift_ = 0;
   std::vector<Step> steps_;  ///< by line crossed
+  mutable std::vector<LaneRange> lane_ranges_;
   std::int32_t first_line_ = 0;
   std::vector<Crossing> near_;         ///< of the stripe's first line
   std::vector<std::size_t> near_end_;  ///< in near_, by line crossed
@@ -494,8 +516,9 @@ void place_eyes(const GroundGrid& grid, const MarchGround& ground, std::int32_t 
       rays.eye_z[i] = static_cast<float>(raised_z_m - ground.middle_z_m());
     }
     rays.low[i] = known ? MarchGround::kNothing : -MarchGround::kNothing;
-    rays.high[i] = rays.rest[i] = rays.low[i];
-    rays.run[i] = 0;
+    rays.slope[i] = rays.high[i] = rays.rest[i] = rays.low[i];
+    rays.error[i] = 0;
+    rays.slope_run[i] = rays.run[i] = 0;
     rays.over_void[i] = 0;
     rays.void_before[i] = known ? 0 : 1;
   }
@@ -503,7 +526,7 @@ void place_eyes(const GroundGrid& grid, const MarchGround& ground, std::int32_t 
 
 /// Of the bundle whose first lane is the tile's i-th.
 void write_elevations(const MarchGround& ground, const RayFan& fan, const MarchTile& tile,
-                      std::int32_t i, std::int32_t line, const RayBundle& rays,
+                      std::int32_t i, std::int32_t line, const RayBundle& rays, double drift,
                       const MarchSearch& search, TileHorizons& horizons) {
   const double p = i - (tile.lanes - 1) / 2.0;
   const double q = line - tile.first_line - (tile.lines - 1) / 2.0;
@@ -520,7 +543,8 @@ void write_elevations(const MarchGround& ground, const RayFan& fan, const MarchT
                          static_cast<float>(shrink),
                          static_cast<float>(-fan.stretch.per_lane * shrink * shrink),
                          static_cast<float>(fan.tangent_error),
-                         static_cast<float>(4 * ground.rounding_m() * nearest)};
+                         static_cast<float>(4 * ground.rounding_m() * nearest),
+                         static_cast<float>(drift)};
   std::array<std::int16_t, kBundle> estimate, lower, upper;
   elevations(row, rays, estimate.data(), lower.data(), upper.data());
   const auto count = static_cast<std::ptrdiff_t>(std::min(kBundle, tile.lanes - i));
@@ -530,7 +554,9 @@ void write_elevations(const MarchGround& ground, const RayFan& fan, const MarchT
   std::copy_n(estimate.begin(), count, &horizons.estimate[to]);
   std::copy_n(lower.begin(), count, &horizons.lower[to]);
   std::copy_n(upper.begin(), count, &horizons.upper[to]);
-  if (search.measures_distance) std::copy_n(rays.run, count, &horizons.run_m[to]);
+  if (search.measures_distance)
+    for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k)
+      horizons.run_m[to + k] = rays.high[k] > rays.slope[k] ? rays.run[k] : rays.slope_run[k];
 }
 
 }  // namespace
@@ -554,7 +580,7 @@ void march_tile(const GroundGrid& grid, const MarchGround& ground, const RayFan&
       for (std::int32_t line = stripe; line < stripe_end; ++line) {
         place_eyes(grid, ground, tile.first_lane + i, line, search.eye_height_m, rays);
         march.run(line, rays);
-        write_elevations(ground, fan, tile, i, line, rays, search, horizons);
+        write_elevations(ground, fan, tile, i, line, rays, march.drift(), search, horizons);
       }
     }
   }
