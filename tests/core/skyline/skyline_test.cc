@@ -9,6 +9,7 @@
 #include <numbers>
 #include <random>
 
+#include "core/geodesy/sun.h"
 #include "core/skyline/crossing_kernels.h"
 #include "core/skyline/sky_view.h"
 #include "core/threads/parallel_for.h"
@@ -281,6 +282,35 @@ TEST(CastShadow, OfAWallReachesAsFarAsItsHeightAsks) {
     EXPECT_EQ(light[15 * 80 + static_cast<std::size_t>(c)],
               c > 40 && c <= 52 ? Sunlight::kShadow : Sunlight::kLit)
         << c;
+}
+
+/// On a plain of small waves most samples see the sun near their horizon.
+TEST(CastShadow, IsWhatTheJudgeSays) {
+  std::mt19937 random(2);
+  const GroundGrid grid = ground_of(60, 50, 30, [&](std::int32_t, std::int32_t) {
+    return std::uniform_real_distribution<double>(0, 0.05)(random);
+  });
+  const double elevation = -0.0095, azimuth = 1.1;  // raised to about 0.0004
+  std::vector<Sunlight> light(60 * 50);
+  const std::size_t by_judge =
+      cast_shadow(grid, {},
+                  {std::cos(elevation) * std::sin(azimuth), std::cos(elevation) * std::cos(azimuth),
+                   std::sin(elevation)},
+                  light);
+  EXPECT_GT(by_judge, 20U);
+  std::size_t lit = 0, shadow = 0;
+  for (std::int32_t r = 0; r < 50; ++r) {
+    for (std::int32_t c = 0; c < 60; ++c) {
+      const JudgedHorizon judged = judge_horizon(grid, {}, 0, c, r, azimuth);
+      const bool is_lit = !judged.met || judged.elevation_rad <= refracted_elevation_rad(elevation);
+      EXPECT_EQ(light[static_cast<std::size_t>(r * 60 + c)],
+                is_lit ? Sunlight::kLit : Sunlight::kShadow)
+          << c << ' ' << r;
+      ++(is_lit ? lit : shadow);
+    }
+  }
+  EXPECT_GT(lit, 100U);
+  EXPECT_GT(shadow, 100U);
 }
 
 TEST(CastShadow, NoneWhereTheSunIsUpAndAllWhereItIsDown) {
