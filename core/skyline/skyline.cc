@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "core/geodesy/sun.h"
@@ -38,6 +39,10 @@ double spacing_m(const GroundGrid& grid, bool along_rows) {
   const std::int32_t c = grid.columns() / 2, r = grid.rows() / 2;
   const Position a = grid.at(c, r), b = along_rows ? grid.at(c - 1, r) : grid.at(c, r - 1);
   return std::hypot(a.x_m - b.x_m, a.y_m - b.y_m);
+}
+
+void copy_apart(const std::int16_t* from, std::size_t step, std::size_t count, std::int16_t* to) {
+  for (std::size_t i = 0; i < count; ++i) to[i] = from[i * step];
 }
 
 /// The same cells in columns and rows, or back.
@@ -128,25 +133,29 @@ void Skyline::look_from(const Part& part, const MarchGround& ground, const Azimu
   march_tile(grid_, ground, fan, part.tile, search, found);
   const bool rows = part.march == March::kOverRows;
   const auto lanes = static_cast<std::size_t>(part.tile.lanes);
-  const std::size_t columns = static_cast<std::size_t>(grid_.columns());
+  const auto columns = static_cast<std::size_t>(grid_.columns());
   const std::int32_t across = rows ? part.tile.lanes : part.tile.lines;
   const std::int32_t down = rows ? part.tile.lines : part.tile.lanes;
   const std::int32_t first_column = rows ? part.tile.first_lane : part.tile.first_line;
   const std::int32_t first_row = rows ? part.tile.first_line : part.tile.first_lane;
   for (std::int32_t r = 0; r < down; ++r) {
-    for (std::int32_t c = 0; c < across; ++c) {
-      const std::size_t from =
-          static_cast<std::size_t>(rows ? r : c) * lanes + static_cast<std::size_t>(rows ? c : r);
-      const std::size_t to = static_cast<std::size_t>(first_row + r) * columns +
-                             static_cast<std::size_t>(first_column + c);
-      bands.estimate[to] = found.estimate[from];
-      bands.lower[to] = found.lower[from];
-      bands.upper[to] = found.upper[from];
-      if (search.measures_distance)
-        bands.distance_m[to] =
-            found.estimate[from] == kUnknownElevation || found.estimate[from] == kNothingSeen
-                ? std::numeric_limits<float>::quiet_NaN()
-                : distance_m(azimuth, first_column + c, first_row + r, found.run_m[from]);
+    const std::size_t to =
+        static_cast<std::size_t>(first_row + r) * columns + static_cast<std::size_t>(first_column);
+    // Cells of a row lie side by side in the tile, or a line apart.
+    const std::size_t from = static_cast<std::size_t>(r) * (rows ? lanes : 1);
+    const std::size_t step = rows ? 1 : lanes;
+    const auto count = static_cast<std::size_t>(across);
+    copy_apart(&found.estimate[from], step, count, &bands.estimate[to]);
+    copy_apart(&found.lower[from], step, count, &bands.lower[to]);
+    copy_apart(&found.upper[from], step, count, &bands.upper[to]);
+    if (!search.measures_distance) continue;
+    for (std::size_t c = 0; c < count; ++c) {
+      const std::int16_t elevation = bands.estimate[to + c];
+      bands.distance_m[to + c] =
+          elevation == kUnknownElevation || elevation == kNothingSeen
+              ? std::numeric_limits<float>::quiet_NaN()
+              : distance_m(azimuth, first_column + static_cast<std::int32_t>(c), first_row + r,
+                           found.run_m[from + c * step]);
     }
   }
 }
