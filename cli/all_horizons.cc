@@ -26,10 +26,10 @@ namespace {
 constexpr int kAzimuthsOfAll = 16;
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 
-/// Bytes a sample besides the output: the ground twice, its squares, one azimuth's bands.
-constexpr double kWorkBytesPerSample = 16;
-/// Of the output's bytes, with its overviews and its compressed copy.
-constexpr double kBytesPerOutputByte = 2;
+/// Bytes a sample besides the output: the ground twice, its squares, an estimate.
+constexpr double kWorkBytesPerSample = 12;
+/// Of the output's bytes, with its overviews.
+constexpr double kBytesPerOutputByte = 1.4;
 
 /// Wrong use shows before any work.
 void check_options(const HorizonOptions& options) {
@@ -156,12 +156,12 @@ class AllHorizonsRun {
     if (!options_.distance_output.empty()) distances_m_ = LargeArray<float>(samples_ * azimuths);
     if (!options_.sky_view_output.empty() || !options_.openness_output.empty())
       sky_.emplace(samples_, !options_.sky_view_output.empty(), !options_.openness_output.empty());
-    // What is not kept is written over with every azimuth.
-    LargeArray<std::int16_t> spare(samples_ * (keeps ? 3 - per_azimuth : 3));
+    // An estimate that is not kept is written over with every azimuth.
+    LargeArray<std::int16_t> spare(keeps ? 0 : samples_);
     const auto band = [&](std::size_t azimuth, std::size_t which) {
-      if (keeps && which < per_azimuth)
-        return bands_.span().subspan((azimuth * per_azimuth + which) * samples_, samples_);
-      return spare.span().subspan((keeps ? which - per_azimuth : which) * samples_, samples_);
+      if (!keeps) return which == 0 ? spare.span() : std::span<std::int16_t>();
+      if (which >= per_azimuth) return std::span<std::int16_t>();
+      return bands_.span().subspan((azimuth * per_azimuth + which) * samples_, samples_);
     };
     std::size_t done = 0;
     for (const std::size_t i : in_order(skyline)) {

@@ -146,8 +146,8 @@ void Skyline::look_from(const Part& part, const MarchGround& ground, const Azimu
     const std::size_t step = rows ? 1 : lanes;
     const auto count = static_cast<std::size_t>(across);
     copy_apart(&found.estimate[from], step, count, &bands.estimate[to]);
-    copy_apart(&found.lower[from], step, count, &bands.lower[to]);
-    copy_apart(&found.upper[from], step, count, &bands.upper[to]);
+    if (!bands.lower.empty()) copy_apart(&found.lower[from], step, count, &bands.lower[to]);
+    if (!bands.upper.empty()) copy_apart(&found.upper[from], step, count, &bands.upper[to]);
     if (!search.measures_distance) continue;
     for (std::size_t c = 0; c < count; ++c) {
       const std::int16_t elevation = bands.estimate[to + c];

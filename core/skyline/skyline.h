@@ -23,8 +23,8 @@ struct SkylineOptions {
 /// kUnknownElevation: the sample is void, or the ray passes void before known ground.
 struct SkylineBands {
   std::span<std::int16_t> estimate;
-  std::span<std::int16_t> lower, upper;
-  std::span<float> distance_m;  ///< along the ground, of the estimate; empty: not wanted
+  std::span<std::int16_t> lower, upper;  ///< empty: not wanted
+  std::span<float> distance_m;           ///< along the ground, of the estimate; empty: not wanted
 };
 
 /// The horizons of all samples of a grid: what the judge (judge_horizon) finds for each, in
