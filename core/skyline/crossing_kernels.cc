@@ -199,9 +199,10 @@ void note_void_loosely_now(const LooseCrossing& c, RayBundle& rays) {
     const Vector z2 = hn::LoadU(kTag, c.z + ray + 2);
     const Vector beside = hn::Min(hn::IfThenElse(left, z0, z1), hn::IfThenElse(right, z2, z1));
     const Vector lower = hn::Min(z1, beside);
-    const Vector end_beside = hn::IfThenElse(left, z0, z2);
-    note(hn::And(taken, hn::Min(z1, end_beside) > ground), hn::And(taken, lower < missing), ray,
-         rays);
+    // Known wherever it may be: a ray over the sample itself needs neither side.
+    const Mask side_known = hn::Or(hn::And(left, z0 > ground), hn::And(right, z2 > ground));
+    const Mask known = hn::And(z1 > ground, hn::Or(hn::And(left, right), side_known));
+    note(hn::And(taken, known), hn::And(taken, lower < missing), ray, rays);
   }
 }
 

@@ -387,7 +387,10 @@ class BundleMarch {
     const double bent = is_parallel ? 0 : (last_along - along) / along;
     const double reach =
         is_parallel ? 1 : std::min(1.0, slack_lanes / std::abs(along) + bent * bent / 4);
-    for (std::int32_t j = first; j <= last; ++j) {
+    // In the order of the rays, which void asks for.
+    const std::int32_t step = along < 0 ? -1 : 1;
+    for (std::int32_t n = 0; n <= last - first; ++n) {
+      const std::int32_t j = (step > 0 ? first : last) + n * step;
       // Not the cell's own column at the begin of its ray.
       if ((k == 1 && j == 0) || is_off_grid(j)) continue;
       const BetweenPlace found{j, is_parallel ? 0.5 : (j - from) / along,
