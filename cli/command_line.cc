@@ -231,22 +231,55 @@ void add_sight(CLI::App& app, SightOptions& o, std::function<int()>& run) {
   c->callback([&] { run = [&o] { return run_sight(o); }; });
 }
 
+/// What is for all points of a DEM.
+void add_all_horizons(CLI::App& command, HorizonOptions& o) {
+  command
+      .add_option("--eye-height", o.eye_height_m, "All points: metres above ground; 0 unless given")
+      ->check(CLI::Range(0.0, 10'000.0));
+  command
+      .add_option("--tolerance", o.tolerance_deg,
+                  "All points: degrees by which a horizon's bounds may differ at most; 0.3 unless "
+                  "given")
+      ->check(CLI::Range(0.0, 10.0));
+  command.add_flag("--estimate-only", o.estimate_only, "All points: leave the bounds out");
+  command.add_option("--distance", o.distance_output,
+                     "All points: a raster of the horizons' distances, metres along the ground");
+  command.add_option("--sky-view", o.sky_view_output, "All points: a raster of sky view factors");
+  command.add_option("--openness", o.openness_output,
+                     "All points: a raster of positive openness, degrees");
+  command.add_option_function<std::string>(
+      "--sun",
+      [&o](const std::string& text) {
+        o.sun_days = parse_moment(text);
+        o.sun_text = text;
+      },
+      "All points: instead of horizons, what lies in the shadow that the ground casts at a time, "
+      "such as 2026-06-21T12:00Z: 1 lit, 0 in shadow, 255 unknown");
+}
+
 void add_horizon(CLI::App& app, HorizonOptions& o, std::function<int()>& run) {
-  CLI::App* c = app.add_subcommand("horizon", "The horizon all around a place, as CSV or JSON");
+  CLI::App* c = app.add_subcommand(
+      "horizon", "The horizon all around a place, or around each point of a DEM with bounds");
   c->footer(
-      "Example:\n  scarp horizon alps.tif --at 8.65,46.55,2 --crs OGC:CRS84 > horizon.csv\n"
-      "A line for each azimuth: the elevation angle under which the highest ground is seen, how\n"
-      "far it is and where. Angles are against the level plane of the eye, below it too.");
+      "Examples:\n  scarp horizon alps.tif --at 8.65,46.55,2 --crs OGC:CRS84 > horizon.csv\n"
+      "  scarp horizon alps.tif -o horizons.tif --azimuths 32 --sky-view sky.tif\n"
+      "  scarp horizon alps.tif -o shadow.tif --sun 2026-06-21T12:00Z\n"
+      "Of a place, a line for each azimuth: the elevation angle under which the highest ground is\n"
+      "seen, how far it is and where. Of all points, three bands for each azimuth: the angle, and\n"
+      "bounds that it is between, in steps of 0.01 degree; -9000 no ground that way, -32768\n"
+      "unknown. Angles are against the level plane of the eye, below it too.");
   add_sources(*c, o.sources);
   c->add_option_function<std::string>("--at", position_into(o.at),
                                       "The eye, X,Y[,H]: H metres above ground (2), or as 1200asl");
   c->add_option("--crs", o.crs, "CRS of --at, such as OGC:CRS84; that of the data unless given");
   c->add_option(
        "--azimuths", o.azimuths,
-       "Directions, from north clockwise; 360 unless given. True north, grid north without "
-       "a CRS")
+       "Directions, from north clockwise; 360 unless given, 16 for all points. True north, grid "
+       "north without a CRS")
       ->check(CLI::Range(1, 1'000'000));
-  c->add_option("-o,--output", o.output, "A file, .csv or .json; standard output unless given");
+  c->add_option("-o,--output", o.output,
+                "With --at a file, .csv or .json, standard output unless given; otherwise .tif");
+  add_all_horizons(*c, o);
   add_surface(*c, o.dem);
   add_common(*c, o.common);
   c->callback([&] { run = [&o] { return run_horizon(o); }; });

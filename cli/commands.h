@@ -14,6 +14,8 @@ int run_preview(const PreviewCommandOptions& options);
 int run_viewshed(const ViewshedOptions& options);
 int run_sight(const SightOptions& options);
 int run_horizon(const HorizonOptions& options);
+/// Horizons of all samples of a DEM, and what is made of them.
+int run_all_horizons(const HorizonOptions& options);
 int run_check(const CheckOptions& options);
 
 /// Parses the command line and runs the subcommand. Exit code: 0 done, 1 the input or a resource

@@ -17,6 +17,8 @@ namespace {
 
 using nlohmann::json;
 
+constexpr int kAzimuthsOfPlace = 360;
+
 /// The horizon in one direction; without a place where no known ground lies that way.
 struct HorizonLine {
   double azimuth_deg = 0;
@@ -104,13 +106,26 @@ std::string csv_of(const SightSurface& surface, const std::vector<HorizonLine>& 
   return csv;
 }
 
+/// What is for all points has no use for one.
+void check_place_options(const HorizonOptions& options) {
+  const auto refuse = [](bool is_given, const char* name) {
+    if (is_given)
+      throw Error(ErrorCode::kUsage,
+                  fmt::format("{}: is for the horizons of all points; leave it or --at out", name));
+  };
+  refuse(options.eye_height_m > 0, "--eye-height");
+  refuse(options.estimate_only, "--estimate-only");
+  refuse(!options.distance_output.empty(), "--distance");
+  refuse(!options.sky_view_output.empty(), "--sky-view");
+  refuse(!options.openness_output.empty(), "--openness");
+  refuse(options.sun_days.has_value(), "--sun");
+}
+
 }  // namespace
 
 int run_horizon(const HorizonOptions& options) {
-  if (!options.at)
-    throw Error(ErrorCode::kUsage,
-                "no place: --at X,Y[,H] was expected; horizons of all points of a DEM are not "
-                "computed by this command yet");
+  if (options.of_all_points()) return run_all_horizons(options);
+  check_place_options(options);
   const std::string& path = options.output;
   if (!path.empty() && !path.ends_with(".csv") && !path.ends_with(".json"))
     throw Error(ErrorCode::kUsage,
@@ -123,7 +138,7 @@ int run_horizon(const HorizonOptions& options) {
   dem.memory_budget_bytes = options.common.memory_budget_bytes;
   const auto surface = open_surface(options.sources, dem, bar.stage("read"));
   const SightEnd eye = surface->place(*options.at, options.crs);
-  const auto lines = horizon_of(*surface, eye, options.azimuths);
+  const auto lines = horizon_of(*surface, eye, options.azimuths.value_or(kAzimuthsOfPlace));
   bar.clear();
   const auto text = [&](bool as_json) {
     return as_json ? json_of(*surface, eye, lines).dump(2) + "\n" : csv_of(*surface, lines);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <chrono>
 #include <cmath>
 #include <string_view>
 
@@ -81,6 +82,53 @@ double parse_frequency(const std::string& text) {
                             "expected, such as 5.8GHz or 868MHz",
                             text));
   return *value * factor;
+}
+
+double parse_moment(const std::string& text) {
+  const auto refuse = [&] {
+    throw Error(ErrorCode::kUsage,
+                fmt::format("--sun {}: not understood; a date and a time with its zone were "
+                            "expected, such as 2026-06-21T12:00Z or 2026-06-21T14:00+02:00",
+                            text));
+  };
+  std::string_view rest = text;
+  const auto take_digits = [&](std::size_t count, int least, int most) {
+    int value = 0;
+    if (rest.size() < count) refuse();
+    const auto [end, error] = std::from_chars(rest.data(), rest.data() + count, value);
+    if (error != std::errc() || end != rest.data() + count || value < least || value > most)
+      refuse();
+    rest.remove_prefix(count);
+    return value;
+  };
+  const auto expect = [&](std::string_view mark) {
+    if (!take(rest, mark)) refuse();
+  };
+  const int year = take_digits(4, 1900, 2200);
+  expect("-");
+  const int month = take_digits(2, 1, 12);
+  expect("-");
+  const std::chrono::year_month_day date{
+      std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
+      std::chrono::day(static_cast<unsigned>(take_digits(2, 1, 31)))};
+  if (!date.ok()) refuse();
+  expect("T");
+  double seconds = take_digits(2, 0, 23) * 3600;
+  expect(":");
+  seconds += take_digits(2, 0, 59) * 60;
+  if (take(rest, ":")) seconds += take_digits(2, 0, 60);
+  if (!take(rest, "Z")) {
+    const double sign = take(rest, "-") ? 1 : -1;
+    if (sign < 0) expect("+");
+    seconds += sign * take_digits(2, 0, 14) * 3600;
+    expect(":");
+    seconds += sign * take_digits(2, 0, 59) * 60;
+  }
+  if (!rest.empty()) refuse();
+  constexpr std::chrono::sys_days kEpoch =
+      std::chrono::year(2000) / std::chrono::January / std::chrono::day(1);
+  const auto days = static_cast<double>((std::chrono::sys_days(date) - kEpoch).count());
+  return days + seconds / 86'400 - 0.5;
 }
 
 MapPoint to_map_point(const TypedPosition& typed, const std::string& crs, const GeoFrame& frame) {

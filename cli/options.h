@@ -119,8 +119,18 @@ struct HorizonOptions {
   std::vector<std::string> sources;  ///< a scene, or DEM files
   std::optional<TypedPosition> at;
   std::string crs;  ///< of `at`; empty: the data's
-  int azimuths = 360;
-  std::string output;  ///< .csv or .json; empty: standard output
+  std::optional<int> azimuths;
+  std::string output;  ///< of a place .csv or .json, empty: standard output; of all points .tif
+
+  // All points:
+  double eye_height_m = 0;
+  double tolerance_deg = 0.3;
+  bool estimate_only = false;
+  std::string distance_output, sky_view_output, openness_output;
+  std::optional<double> sun_days;  ///< since 2000-01-01T12:00 UTC
+  std::string sun_text;            ///< as typed
+
+  bool of_all_points() const { return !at; }
 };
 
 struct CullOptions {
@@ -176,6 +186,10 @@ std::pair<double, double> parse_range(const std::string& option, const std::stri
 
 /// Reads "5.8GHz", "868MHz", "2.4e9" and the like as hertz. Throws Error{kUsage}.
 double parse_frequency(const std::string& text);
+
+/// Reads a moment such as 2026-06-21T12:00Z, 2026-06-21T14:00:30+02:00, as days since
+/// 2000-01-01T12:00 UTC. Throws Error{kUsage}.
+double parse_moment(const std::string& text);
 
 /// The typed place in the CRS of the data, converted from `crs` where that is given; its height as
 /// typed. Throws Error{kInput}.

@@ -95,6 +95,29 @@ double EyeBearings::apparent_pitch_rad(const Position& target) const {
   return std::atan2(dot(ray, up_), std::hypot(dot(ray, east_), dot(ray, north_)));
 }
 
+double EyeBearings::plane_direction_rad(double azimuth_rad) const {
+  if (!earth_) return std::numbers::pi / 2 - azimuth_rad;
+  constexpr double kHalfChordM = 500;
+  const double east_m = kHalfChordM * std::sin(azimuth_rad);
+  const double north_m = kHalfChordM * std::cos(azimuth_rad);
+  const auto at = [&](double part) {
+    return earth_->frame.flatten(
+        {eye_ecef_.x_m + part * (east_m * east_.x_m + north_m * north_.x_m),
+         eye_ecef_.y_m + part * (east_m * east_.y_m + north_m * north_.y_m),
+         eye_ecef_.z_m + part * (east_m * east_.z_m + north_m * north_.z_m)});
+  };
+  const Position behind = at(-1), ahead = at(1);
+  return std::atan2(ahead.y_m - behind.y_m, ahead.x_m - behind.x_m);
+}
+
+Bearing EyeBearings::to_far(const EcefPoint& ecef) const {
+  const double east = earth_ ? dot(ecef, east_) : ecef.x_m;
+  const double north = earth_ ? dot(ecef, north_) : ecef.y_m;
+  const double up = earth_ ? dot(ecef, up_) : ecef.z_m;
+  return {std::numeric_limits<double>::infinity(), azimuth_of(east, north),
+          std::atan2(up, std::hypot(east, north))};
+}
+
 bool within(const ViewLimits& limits, const Bearing& bearing) {
   if (bearing.distance_m < limits.min_distance_m || bearing.distance_m > limits.max_distance_m)
     return false;

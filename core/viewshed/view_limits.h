@@ -54,6 +54,13 @@ class EyeBearings {
   /// Pitch at which the eye sees a target: of the ray where it leaves the eye, which refraction
   /// bends away from the straight line. Requires a target elsewhere in plan. Error below 1e-8 rad.
   double apparent_pitch_rad(const Position& target) const;
+  /// Direction in the frame's plane, radians counter-clockwise from +x, in which an azimuth leaves
+  /// the eye: that of the vertical plane, radians clockwise from true north (from grid north on the
+  /// flat earth). Within 1e-6 rad of the geodesic's.
+  double plane_direction_rad(double azimuth_rad) const;
+  /// Where an infinitely far point lies in the sky. @param ecef  unit vector towards it
+  /// On the flat earth the vector's components are east, north and up.
+  Bearing to_far(const EcefPoint& ecef) const;
 
  private:
   static constexpr double kShortM = 500'000;

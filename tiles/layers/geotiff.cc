@@ -7,6 +7,8 @@
 
 #include <algorithm>
 #include <cassert>
+#include <filesystem>
+#include <system_error>
 #include <vector>
 
 #include "core/error/error.h"
@@ -36,6 +38,8 @@ LayerData data_of(const LayerSamples& samples) {
     return {GDT_Int32, start(*ints), ints->size(), false, "YES"};
   if (const auto* counts = std::get_if<std::span<const std::uint32_t>>(&samples))
     return {GDT_UInt32, start(*counts), counts->size(), false, "YES"};
+  if (const auto* halves = std::get_if<std::span<const std::int16_t>>(&samples))
+    return {GDT_Int16, start(*halves), halves->size(), false, "YES"};
   const auto& floats = std::get<std::span<const float>>(samples);
   return {GDT_Float32, start(floats), floats.size(), true, "YES"};
 }
@@ -48,9 +52,17 @@ GDALDatasetUniquePtr memory_dataset(const RasterLayer& layer, const LayerData& d
   GDALDatasetUniquePtr dataset(
       driver->Create("", layer.columns, layer.rows, 0, data.type, nullptr));
   if (!dataset) session.fail(path);
-  CPLStringList options;
-  options.SetNameValue("DATAPOINTER", fmt::format("{}", fmt::ptr(data.start)).c_str());
-  if (dataset->AddBand(data.type, options.List()) != CE_None) session.fail(path);
+  const auto add_band = [&](void* start) {
+    CPLStringList options;
+    options.SetNameValue("DATAPOINTER", fmt::format("{}", fmt::ptr(start)).c_str());
+    if (dataset->AddBand(data.type, options.List()) != CE_None) session.fail(path);
+  };
+  add_band(data.start);
+  for (const RasterBand& band : layer.more_bands) {
+    const LayerData more = data_of(band.samples);
+    assert(more.type == data.type && more.count == data.count);
+    add_band(more.start);
+  }
   return dataset;
 }
 
@@ -67,15 +79,42 @@ void build_overviews(GDALDataset& source, const LayerData& data) {
                           factors.data(), 0, nullptr, nullptr, nullptr);
 }
 
+/// GDAL 3.6 does not report what fails while it closes a file, but then samples are missing.
+/// @param source  with its overviews, all of which the file has, not packed
+void check_size(const std::string& built, GDALDataset& source, const std::string& path) {
+  GDALRasterBand& first = *source.GetRasterBand(1);
+  const auto samples_of = [](GDALRasterBand& band) {
+    return static_cast<std::size_t>(band.GetXSize()) * static_cast<std::size_t>(band.GetYSize());
+  };
+  std::size_t samples = samples_of(first);
+  for (int i = 0; i < first.GetOverviewCount(); ++i) samples += samples_of(*first.GetOverview(i));
+  const std::size_t bytes =
+      samples * static_cast<std::size_t>(source.GetRasterCount()) *
+      static_cast<std::size_t>(GDALGetDataTypeSizeBytes(first.GetRasterDataType()));
+  std::error_code unknown;
+  const auto size = std::filesystem::file_size(built, unknown);
+  if (unknown || size < bytes)
+    throw Error(ErrorCode::kResource,
+                fmt::format("'{}': only {} of {} bytes could be written; free space on the disk or "
+                            "write elsewhere",
+                            path, unknown ? 0 : size, bytes));
+}
+
 void describe(GDALDataset& dataset, const RasterLayer& layer) {
   std::array<double, 6> geotransform = layer.geotransform;
   dataset.SetGeoTransform(geotransform.data());
   for (const auto& [key, value] : layer.metadata)
     dataset.SetMetadataItem(key.c_str(), value.c_str());
+  for (int i = 1; i <= dataset.GetRasterCount(); ++i) {
+    GDALRasterBand& band = *dataset.GetRasterBand(i);
+    const std::string& name =
+        i == 1 ? layer.band_name : layer.more_bands[static_cast<std::size_t>(i) - 2].name;
+    if (!name.empty()) band.SetDescription(name.c_str());
+    if (!layer.unit.empty()) band.SetUnitType(layer.unit.c_str());
+    if (layer.nodata) band.SetNoDataValue(*layer.nodata);
+    if (layer.scale != 1) band.SetScale(layer.scale);
+  }
   GDALRasterBand& band = *dataset.GetRasterBand(1);
-  if (!layer.band_name.empty()) band.SetDescription(layer.band_name.c_str());
-  if (!layer.unit.empty()) band.SetUnitType(layer.unit.c_str());
-  if (layer.nodata) band.SetNoDataValue(*layer.nodata);
   if (layer.colours.empty()) return;
   GDALColorTable table;
   for (std::size_t i = 0; i < layer.colours.size(); ++i) {
@@ -106,20 +145,25 @@ void write_geotiff_cog(const std::string& path, const RasterLayer& layer, Existi
   build_overviews(*source, data);
   session.check(path);
   CPLStringList options;
-  options.SetNameValue("COMPRESS", "DEFLATE");
-  options.SetNameValue("PREDICTOR", data.predictor);
+  options.SetNameValue("COMPRESS", layer.is_bulky ? "NONE" : "DEFLATE");
+  if (!layer.is_bulky) options.SetNameValue("PREDICTOR", data.predictor);
   options.SetNameValue("BIGTIFF", "IF_SAFER");
   options.SetNameValue("NUM_THREADS", std::to_string(thread_count()).c_str());
   options.SetNameValue("OVERVIEW_RESAMPLING", data.is_float ? "AVERAGE" : "NEAREST");
   GDALDriver* driver = GetGDALDriverManager()->GetDriverByName("COG");
   if (driver == nullptr) session.fail(path);
-  const std::string built = session.folder() + "/layer.tif";
+  const std::string built = layer.is_bulky ? file.part_path() : session.folder() + "/layer.tif";
   GDALDatasetUniquePtr cog(
       driver->CreateCopy(built.c_str(), source.get(), TRUE, options.List(), nullptr, nullptr));
   if (!cog) session.fail(path);
   cog.reset();  // closing writes the rest
   session.check(path);
-  file.append(session.bytes_of(built, path));
+  if (layer.is_bulky) {
+    check_size(built, *source, path);
+    file.take_over();
+  } else {
+    file.append(session.bytes_of(built, path));
+  }
   file.commit();
 }
 

@@ -14,9 +14,16 @@
 namespace scarp {
 
 using LayerSamples = std::variant<std::span<const std::uint8_t>, std::span<const std::int32_t>,
-                                  std::span<const std::uint32_t>, std::span<const float>>;
+                                  std::span<const std::uint32_t>, std::span<const float>,
+                                  std::span<const std::int16_t>>;
 
-/// One band of numbers over a raster. Borrows the samples.
+/// A further band of a layer.
+struct RasterBand {
+  std::string name;
+  LayerSamples samples;  ///< of the same type as the layer's
+};
+
+/// Numbers over a raster, in one band or more. Borrows the samples.
 struct RasterLayer {
   std::int32_t columns = 0;
   std::int32_t rows = 0;
@@ -24,8 +31,12 @@ struct RasterLayer {
   /// As GDAL has it: x = g[0] + column g[1] + row g[2], y = g[3] + column g[4] + row g[5], of pixel
   /// corners, in units of the CRS.
   std::array<double, 6> geotransform = {0, 1, 0, 0, 0, -1};
-  std::string crs_wkt;           ///< empty: none
-  std::string band_name;         ///< such as "visible"
+  std::string crs_wkt;                 ///< empty: none
+  std::string band_name;               ///< such as "visible"
+  std::vector<RasterBand> more_bands;  ///< after the first, with its unit, nodata and scale
+  double scale = 1;                    ///< what a step of the numbers is worth, in the unit
+  /// Many bands: not packed, and built on the disk instead of in memory.
+  bool is_bulky = false;
   std::string unit;              ///< such as "m"; empty: none
   std::optional<double> nodata;  ///< NaN is allowed for float
   /// Red, green, blue, alpha of the values from 0 on; for uint8 only, at most 256. Empty: none.
@@ -34,13 +45,13 @@ struct RasterLayer {
 };
 
 /// Writes a cloud-optimised GeoTIFF: tiles of 512 x 512, DEFLATE with a predictor where the numbers
-/// vary smoothly, overviews (nearest sample; averages for float). Any GIS reads it. The same layer
-/// gives the same bytes.
+/// vary smoothly, overviews (nearest sample; averages for float). Bands lie pixel by pixel. Any GIS
+/// reads it. The same layer gives the same bytes.
 ///
 /// Requires columns, rows >= 1, as many samples, colours only for uint8 (asserted).
 /// Errors: kResource with GDAL's own words or from the disk, kInput where the file exists and is
-/// not to be replaced, or the CRS is not WKT. Nothing is left behind. Memory: the compressed file,
-/// once more beside the samples.
+/// not to be replaced, or the CRS is not WKT. Nothing is left behind. Memory: overviews (a third of
+/// the samples) and, unless bulky, the compressed file.
 void write_geotiff_cog(const std::string& path, const RasterLayer& layer, Existing existing);
 
 }  // namespace scarp

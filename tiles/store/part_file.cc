@@ -98,6 +98,11 @@ void PartFile::append(std::span<const std::byte> bytes) {
   }
 }
 
+void PartFile::take_over() {
+  file_ = OpenFile(::open(part_path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC));
+  if (!file_) throw_write_error(path_, errno);
+}
+
 void PartFile::commit() {
   assert(file_);
   if (::fsync(file_.descriptor()) != 0) throw_write_error(path_, errno);

@@ -30,6 +30,11 @@ class PartFile {
 
   void append(std::span<const std::byte> bytes);
 
+  /// The part's own name, for a writer that wants one and may put a new file there; afterwards
+  /// take_over() makes what is there the part.
+  const std::string& part_path() const { return part_path_; }
+  void take_over();
+
   /// Flushes the file, renames it, flushes the folder. Once, as the last call.
   void commit();
 

@@ -54,5 +54,25 @@ TEST(EyeBearings, PitchIsAgainstTheLevelPlaneOfTheEye) {
   EXPECT_NEAR(level.pitch_rad, -level.distance_m / (2 * 6.37e6), 2e-6);
 }
 
+/// The direction of an azimuth in the plane is that of the frame's own, from a geodesic.
+TEST(EyeBearings, DirectionInThePlaneIsThatOfTheFrame) {
+  for (const double latitude : {0.0, 46.5, -71.0, 88.5}) {
+    FrameDescription description;
+    description.crs_wkt = "EPSG:4326";
+    description.centre_x = 10;
+    description.centre_y = latitude;
+    const GeoFrame frame(description);
+    const GeoFrame::Placer placer(frame);
+    const MapPoint from{10.4, latitude + 0.3, 800};
+    const EyeBearings bearings(placer.place(from), frame.earth_frame());
+    for (double azimuth = 0; azimuth < 360; azimuth += 31)
+      EXPECT_NEAR(std::remainder(bearings.plane_direction_rad(azimuth / kDegreesPerRadian) -
+                                     placer.plane_direction_rad(from, azimuth),
+                                 2 * std::numbers::pi),
+                  0, 1e-6)
+          << latitude << ' ' << azimuth;
+  }
+}
+
 }  // namespace
 }  // namespace scarp

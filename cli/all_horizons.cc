@@ -1,0 +1,362 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "cli/build/layers.h"
+#include "cli/commands.h"
+#include "cli/loaded_scene.h"
+#include "cli/stages.h"
+#include "core/error/error.h"
+#include "core/geodesy/sun.h"
+#include "core/memory/large_array.h"
+#include "core/skyline/crossing_kernels.h"
+#include "core/skyline/sky_view.h"
+#include "core/skyline/skyline.h"
+#include "tiles/layers/geotiff.h"
+
+namespace scarp {
+namespace {
+
+constexpr int kAzimuthsOfAll = 16;
+constexpr double kRadiansPerDegree = std::numbers::pi / 180;
+
+/// Bytes a sample besides the output: the ground twice, its squares, an estimate.
+constexpr double kWorkBytesPerSample = 12;
+/// Of the output's bytes, with its overviews.
+constexpr double kBytesPerOutputByte = 1.4;
+
+/// Wrong use shows before any work.
+void check_options(const HorizonOptions& options) {
+  for (const std::string& source : options.sources)
+    if (is_scene(source))
+      throw Error(ErrorCode::kUsage,
+                  fmt::format("'{}': is a scene; DEM files were expected for the horizons of all "
+                              "points; for one place give --at X,Y",
+                              source));
+  const bool wants_more = !options.distance_output.empty() || !options.sky_view_output.empty() ||
+                          !options.openness_output.empty();
+  if (options.output.empty() && !wants_more)
+    throw Error(ErrorCode::kUsage,
+                "neither a place nor an output: --at X,Y[,H], or -o OUT.tif for all points, was "
+                "expected");
+  if (!options.output.empty() && !options.output.ends_with(".tif") &&
+      !options.output.ends_with(".tiff"))
+    throw Error(ErrorCode::kUsage,
+                fmt::format("'{}': a name that ends in .tif was expected for the horizons of all "
+                            "points; for one place give --at X,Y",
+                            options.output));
+  if (!options.crs.empty())
+    throw Error(ErrorCode::kUsage, "--crs is for --at; leave it out, or give a place");
+  if (options.sun_days && (wants_more || options.azimuths || options.eye_height_m > 0 ||
+                           options.estimate_only || options.output.empty()))
+    throw Error(ErrorCode::kUsage,
+                "--sun makes the raster of -o and goes with --overwrite, --json and the options of "
+                "the surface; leave the others out");
+  std::vector<std::string> outputs = {options.output, options.distance_output,
+                                      options.sky_view_output, options.openness_output};
+  std::erase_if(outputs, [](const std::string& path) { return path.empty(); });
+  std::sort(outputs.begin(), outputs.end());
+  if (const auto twice = std::adjacent_find(outputs.begin(), outputs.end()); twice != outputs.end())
+    throw Error(
+        ErrorCode::kUsage,
+        fmt::format("'{}': is asked for twice; each output needs a name of its own", *twice));
+  for (const std::string& path : outputs)
+    if (!options.common.overwrite && std::filesystem::exists(path))
+      throw Error(ErrorCode::kInput,
+                  fmt::format("'{}': exists; a new file was expected; give --overwrite to replace "
+                              "it",
+                              path));
+}
+
+/// One run from options to finished rasters, a member function a stage.
+class AllHorizonsRun {
+ public:
+  explicit AllHorizonsRun(const HorizonOptions& options)
+      : options_(options),
+        azimuths_(options.azimuths.value_or(kAzimuthsOfAll)),
+        stages_(!options.common.json) {}
+
+  int run() {
+    check_options(options_);
+    stages_.run("read", [&](const Progress& progress) { read(progress); });
+    if (options_.sun_days) {
+      stages_.run("shadow", [&](const Progress&) { shade(); });
+      stages_.run("write", [&](const Progress&) { write_shadow(); });
+    } else {
+      check_memory();
+      stages_.run("look", [&](const Progress& progress) { look(progress); });
+      stages_.run("write", [&](const Progress&) { write(); });
+    }
+    stages_.finish();
+    print();
+    return 0;
+  }
+
+ private:
+  void read(const Progress& progress) {
+    DemOptions dem = options_.dem;
+    dem.memory_budget_bytes = options_.common.memory_budget_bytes;
+    ground_ = read_ground(options_.sources, dem, progress);
+    samples_ = static_cast<std::size_t>(ground_.grid.columns()) *
+               static_cast<std::size_t>(ground_.grid.rows());
+    earth_ = ground_.dem.frame->earth_frame();
+    if (const double side_m = cell_side_m(ground_.grid); side_m < kLeastCellM)
+      throw Error(ErrorCode::kInput,
+                  fmt::format("'{}': cells are {:.2g} m wide; at least {} m were expected; if they "
+                              "are in degrees, give the data a CRS",
+                              options_.sources.front(), side_m, kLeastCellM));
+    if (options_.sun_days && !earth_)
+      throw Error(
+          ErrorCode::kInput,
+          fmt::format("'{}': --sun wants data with a CRS and --earth ellipsoid, because the "
+                      "sun's place depends on where they are",
+                      options_.sources.front()));
+  }
+
+  std::size_t bands_per_azimuth() const { return options_.estimate_only ? 1 : 3; }
+
+  void check_memory() const {
+    const auto samples = static_cast<double>(samples_);
+    const double azimuths = azimuths_;
+    double output = 0;
+    if (!options_.output.empty())
+      output += azimuths * static_cast<double>(bands_per_azimuth()) * sizeof(std::int16_t);
+    if (!options_.distance_output.empty()) output += azimuths * sizeof(float);
+    double bytes = kWorkBytesPerSample + kBytesPerOutputByte * output;
+    if (!options_.sky_view_output.empty()) bytes += kBytesPerOutputByte * sizeof(float);
+    if (!options_.openness_output.empty())
+      bytes += kBytesPerOutputByte * sizeof(float) + sizeof(std::uint16_t);
+    bytes *= samples;
+    const auto budget = static_cast<double>(options_.common.memory_budget_bytes);
+    if (bytes > budget)
+      throw Error(ErrorCode::kResource,
+                  fmt::format("{} azimuths of {} samples: about {:.1f} GiB of memory were needed, "
+                              "{:.1f} GiB are allowed; give fewer --azimuths, --estimate-only, a "
+                              "part of the DEM or more --memory",
+                              azimuths_, samples_, bytes / 0x1p30, budget / 0x1p30));
+  }
+
+  double azimuth_deg(std::size_t i) const { return 360.0 * static_cast<double>(i) / azimuths_; }
+
+  void look(const Progress& progress) {
+    const auto azimuths = static_cast<std::size_t>(azimuths_);
+    SkylineOptions look;
+    look.eye_height_m = options_.eye_height_m;
+    look.tolerance_rad = options_.tolerance_deg * kRadiansPerDegree;
+    Skyline skyline(ground_.grid, earth_, look);
+    const bool keeps = !options_.output.empty();
+    const std::size_t per_azimuth = bands_per_azimuth();
+    if (keeps) bands_ = LargeArray<std::int16_t>(samples_ * per_azimuth * azimuths);
+    if (!options_.distance_output.empty()) distances_m_ = LargeArray<float>(samples_ * azimuths);
+    if (!options_.sky_view_output.empty() || !options_.openness_output.empty())
+      sky_.emplace(samples_, !options_.sky_view_output.empty(), !options_.openness_output.empty());
+    // An estimate that is not kept is written over with every azimuth.
+    LargeArray<std::int16_t> spare(keeps ? 0 : samples_);
+    const auto band = [&](std::size_t azimuth, std::size_t which) {
+      if (!keeps) return which == 0 ? spare.span() : std::span<std::int16_t>();
+      if (which >= per_azimuth) return std::span<std::int16_t>();
+      return bands_.span().subspan((azimuth * per_azimuth + which) * samples_, samples_);
+    };
+    std::size_t done = 0;
+    for (const std::size_t i : in_order(skyline)) {
+      const SkylineBands bands{band(i, 0), band(i, 1), band(i, 2),
+                               options_.distance_output.empty()
+                                   ? std::span<float>()
+                                   : distances_m_.span().subspan(i * samples_, samples_)};
+      skyline.look(fixed_azimuth(azimuth_deg(i) * kRadiansPerDegree), bands);
+      if (sky_) sky_->add(bands.estimate);
+      if (progress) progress(static_cast<double>(++done) / static_cast<double>(azimuths));
+    }
+  }
+
+  /// Azimuths that march alike one after the other.
+  std::vector<std::size_t> in_order(const Skyline& skyline) const {
+    std::vector<std::size_t> order, later;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(azimuths_); ++i) {
+      const March march = skyline.march_for(fixed_azimuth(azimuth_deg(i) * kRadiansPerDegree));
+      (march == March::kOverRows ? order : later).push_back(i);
+    }
+    order.insert(order.end(), later.begin(), later.end());
+    return order;
+  }
+
+  void shade() {
+    light_.resize(samples_);
+    judged_ = cast_shadow(ground_.grid, earth_, sun_direction(*options_.sun_days), light_);
+  }
+
+  Existing existing() const {
+    return options_.common.overwrite ? Existing::kReplace : Existing::kRefuse;
+  }
+
+  void write() {
+    const auto azimuths = static_cast<std::size_t>(azimuths_);
+    if (!options_.output.empty()) {
+      const std::span<const std::int16_t> all = bands_.span();
+      const auto band = [&](std::size_t i) { return all.subspan(i * samples_, samples_); };
+      static constexpr std::array<const char*, 3> kKinds = {"estimate", "lower", "upper"};
+      const auto name = [&](std::size_t i) {
+        return fmt::format("azimuth {:.10g} {}", azimuth_deg(i / bands_per_azimuth()),
+                           kKinds[i % bands_per_azimuth()]);
+      };
+      RasterLayer layer = layer_over(ground_.dem, band(0), name(0));
+      for (std::size_t i = 1; i < azimuths * bands_per_azimuth(); ++i)
+        layer.more_bands.push_back({name(i), band(i)});
+      layer.unit = "degree";
+      layer.scale = 0.01;
+      layer.nodata = kUnknownElevation;
+      layer.is_bulky = true;
+      layer.metadata["VALUES"] =
+          "elevation of the horizon above the level plane of the eye, steps of 0.01 degree; -9000 "
+          "no ground that way; -32768 unknown";
+      write_layer(options_.output, layer);
+    }
+    if (!options_.distance_output.empty()) {
+      const std::span<const float> all = distances_m_.span();
+      const auto name = [&](std::size_t i) {
+        return fmt::format("azimuth {:.10g}", azimuth_deg(i));
+      };
+      RasterLayer layer = layer_over(ground_.dem, all.first(samples_), name(0));
+      for (std::size_t i = 1; i < azimuths; ++i)
+        layer.more_bands.push_back({name(i), all.subspan(i * samples_, samples_)});
+      layer.unit = "m";
+      layer.is_bulky = true;
+      write_floats(options_.distance_output, layer,
+                   "distance of the estimated horizon along the ground");
+    }
+    if (!options_.sky_view_output.empty()) {
+      RasterLayer layer = layer_over(ground_.dem, sky_->sky_view(), "sky view factor");
+      write_floats(options_.sky_view_output, layer,
+                   "sky view factor of a level surface: mean of cos^2 of the horizon's elevation, "
+                   "at least 0 (Dozier and Frew 1990)");
+    }
+    if (!options_.openness_output.empty()) {
+      RasterLayer layer = layer_over(ground_.dem, sky_->openness_deg(), "positive openness");
+      layer.unit = "degree";
+      write_floats(options_.openness_output, layer,
+                   "positive openness: mean zenith angle of the horizon (Yokoyama et al. 2002), no "
+                   "limit of distance");
+    }
+  }
+
+  void write_floats(const std::string& path, RasterLayer& layer, const std::string& values) {
+    layer.nodata = std::numeric_limits<double>::quiet_NaN();
+    layer.metadata["VALUES"] = values + "; NaN unknown";
+    write_layer(path, layer);
+  }
+
+  void write_shadow() {
+    const std::span<const std::uint8_t> bytes(reinterpret_cast<const std::uint8_t*>(light_.data()),
+                                              light_.size());
+    RasterLayer layer = layer_over(ground_.dem, bytes, "lit");
+    layer.nodata = 255;
+    layer.colours = {{{48, 56, 78, 255}, {255, 226, 140, 255}}};
+    layer.metadata["VALUES"] =
+        "1 lit, 0 in the shadow of other ground or of the Earth, 255 unknown";
+    layer.metadata["SUN"] = options_.sun_text;
+    layer.metadata["SUN_MODEL"] =
+        "a point without parallax (Meeus 1998, 0.01 degree), raised by refraction as at 10 degrees "
+        "Celsius and 1010 hPa (Saemundsson 1986)";
+    const Position middle = ground_.grid.at(ground_.grid.columns() / 2, ground_.grid.rows() / 2);
+    const Bearing sun = EyeBearings(middle, earth_).to_far(sun_direction(*options_.sun_days));
+    layer.metadata["SUN_AZIMUTH_DEG"] = fmt::format("{:.4f}", sun.azimuth_rad / kRadiansPerDegree);
+    layer.metadata["SUN_ELEVATION_DEG"] =
+        fmt::format("{:.4f}", refracted_elevation_rad(sun.pitch_rad) / kRadiansPerDegree);
+    write_layer(options_.output, layer);
+  }
+
+  /// With what the run was, for whoever opens the raster.
+  void write_layer(const std::string& path, RasterLayer& layer) const {
+    const FrameDescription& frame = ground_.dem.frame->description();
+    std::map<std::string, std::string>& metadata = layer.metadata;
+    metadata["SURFACE"] = "grid";
+    metadata["EARTH"] = frame.earth == Earth::kFlat ? "flat" : "ellipsoid";
+    metadata["REFRACTION"] = fmt::format("{:g}", frame.refraction);
+    metadata["HEIGHTS"] = frame.earth == Earth::kFlat ? "above the map plane"
+                          : frame.geoid_file.empty()  ? "taken as ellipsoidal"
+                                                      : "geoid added";
+    metadata["HEIGHT_UNIT_OF_DEM"] = ground_.dem.height_unit;
+    if (!options_.sun_days) {
+      metadata["AZIMUTHS"] = fmt::format("{} from {} north clockwise", azimuths_,
+                                         frame.earth == Earth::kFlat ? "grid" : "true");
+      metadata["EYE_HEIGHT_M"] = fmt::format("{:g}", options_.eye_height_m);
+      metadata["TOLERANCE_DEG"] = fmt::format("{:g}", options_.tolerance_deg);
+    }
+    write_geotiff_cog(path, layer, existing());
+  }
+
+  nlohmann::json summary() const {
+    nlohmann::json result = {{"columns", ground_.grid.columns()},
+                             {"rows", ground_.grid.rows()},
+                             {"warnings", ground_.dem.warnings}};
+    if (options_.sun_days) {
+      const auto samples_with = [&](Sunlight value) {
+        return std::count(light_.begin(), light_.end(), value);
+      };
+      result["lit_samples"] = samples_with(Sunlight::kLit);
+      result["shadow_samples"] = samples_with(Sunlight::kShadow);
+      result["unknown_samples"] = samples_with(Sunlight::kUnknown);
+      result["judged_samples"] = judged_;
+    } else {
+      result["azimuths"] = azimuths_;
+    }
+    for (const auto& [name, path] :
+         {std::pair("output", options_.output), std::pair("distance", options_.distance_output),
+          std::pair("sky_view", options_.sky_view_output),
+          std::pair("openness", options_.openness_output)})
+      if (!path.empty()) result[name] = path;
+    for (const StageCost& cost : stages_.costs())
+      result["stages"].push_back(
+          {{"name", cost.name}, {"seconds", cost.seconds}, {"peak_bytes", cost.peak_bytes}});
+    return result;
+  }
+
+  void print() const {
+    for (const std::string& warning : ground_.dem.warnings)
+      fmt::print(stderr, "scarp: warning: {}\n", warning);
+    const nlohmann::json result = summary();
+    if (options_.common.json) {
+      fmt::print("{}\n", result.dump(2));
+      return;
+    }
+    if (options_.sun_days) {
+      fmt::print("{}: {} samples lit, {} in shadow, {} unknown\n", options_.output,
+                 result["lit_samples"].get<std::size_t>(),
+                 result["shadow_samples"].get<std::size_t>(),
+                 result["unknown_samples"].get<std::size_t>());
+      return;
+    }
+    for (const auto& [path, what] :
+         {std::pair(options_.output, "horizons"), std::pair(options_.distance_output, "distances"),
+          std::pair(options_.sky_view_output, "sky view factors"),
+          std::pair(options_.openness_output, "openness")})
+      if (!path.empty())
+        fmt::print("{}: {} of {} samples in {} directions\n", path, what, samples_, azimuths_);
+  }
+
+  const HorizonOptions& options_;
+  const int azimuths_;
+  Stages stages_;
+  Ground ground_;
+  std::size_t samples_ = 0;
+  std::optional<EarthFrame> earth_;
+  LargeArray<std::int16_t> bands_;  ///< azimuth by azimuth: estimate, lower, upper
+  LargeArray<float> distances_m_;
+  std::optional<SkyView> sky_;
+  std::vector<Sunlight> light_;
+  std::size_t judged_ = 0;
+};
+
+}  // namespace
+
+int run_all_horizons(const HorizonOptions& options) {
+  return AllHorizonsRun(options).run();
+}
+
+}  // namespace scarp

@@ -1,0 +1,592 @@
+#include "core/skyline/horizon_march.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+#include "core/skyline/crossing_kernels.h"
+
+namespace scarp {
+namespace {
+
+/// Lines that every ray crosses one by one; then squares take over.
+constexpr std::int32_t kNearLines = 16;
+
+/// Squares are asked first as large as this share of their distance.
+constexpr std::int32_t kDistanceInSquares = 2;
+
+/// Beforehand, lines are crossed this share of their distance apart.
+constexpr std::int32_t kDistanceInSteps = 8;
+
+constexpr unsigned kAllGroups = (1U << kGroups) - 1;
+
+/// Places this near to a sample are looked at with both of its segments, lanes.
+constexpr double kNearSample = 1e-6;
+
+/// One bundle of rays on its way.
+class BundleMarch {
+ public:
+  BundleMarch(const MarchGround& ground, const RayFan& fan, const MarchTile& tile,
+              const MarchSearch& search)
+      : ground_(ground),
+        fan_(fan),
+        tile_(tile),
+        search_(search),
+        exact_(fan.slack_fixed == 0 && fan.slack_rate == 0),
+        steps_(fan.place.size()),
+        lane_ranges_(fan.place.size()) {}
+
+  /// Lines of cells that share the places of their crossings: so many that these are off by
+  /// kStripeSlack at most.
+  std::int32_t stripe_lines() const {
+    const double change = std::abs(fan_.turn.per_line);
+    return change * kMostStripeLines <= kStripeSlack
+               ? kMostStripeLines
+               : std::max(1, static_cast<std::int32_t>(kStripeSlack / change));
+  }
+
+  /// Relative error of the runs of the crossings so far in the stripe.
+  double drift() const { return drift_; }
+
+  /// Begins a stripe of bundles, one above the other.
+  void begin_stripe(std::int32_t lane, std::int32_t first_line, std::int32_t lines) {
+    lane_ = lane;
+    const double p = lane - tile_.first_lane - (tile_.lanes - 1) / 2.0;
+    const double q = first_line + (lines - 1) / 2.0 - tile_.first_line - (tile_.lines - 1) / 2.0;
+    turn_ = fan_.turn.at(p, q);
+    stripe_slack_ = exact_ ? 0 : std::abs(fan_.turn.per_line) * (lines - 1) / 2;
+    ++stripe_;
+    drift_ = 0;
+    first_line_ = first_line;
+    near_.clear();
+    near_end_.assign(1, 0);
+    unsure_.clear();
+  }
+
+  /// Requires rays with eyes, from the stripe's first lane on.
+  void run(std::int32_t line, RayBundle& rays) {
+    line_ = line;
+    rays_ = &rays;
+    reach_ = std::min(fan_.reach(), fan_.line_step > 0 ? ground_.lines() - 1 - line : line);
+    if (reach_ < 1) return;
+    notes_void_ = ground_.has_void();
+    const std::int32_t near = last_near_line();
+    if (notes_void_)
+      cross_lines(1, near, kAllGroups);
+    else
+      cross_near(near);
+    cross_some(near + 1);
+    list_squares(near + 1);
+    for (const Span& span : spans_) search_span(span, kAllGroups);
+  }
+
+ private:
+  /// Lines [first, last], counted from the rays' begins, that a row of squares holds.
+  struct Span {
+    int level;
+    std::int32_t block, first, last;
+  };
+
+  std::int32_t line_at(std::int32_t k) const { return line_ + fan_.line_step * k; }
+  /// Lanes from the begin of the bundle's first ray at the k-th line, and from ray to ray.
+  double place(std::int32_t k) const { return fan_.place[static_cast<std::size_t>(k)] + k * turn_; }
+  double slack(std::int32_t k) const { return fan_.slack(k) + k * stripe_slack_; }
+  double place_step(std::int32_t k) const { return k * fan_.turn.per_lane; }
+  double inverse_run(std::int32_t k) const { return fan_.inverse_run[static_cast<std::size_t>(k)]; }
+  /// Samples of a line by lane offset from the bundle's first ray.
+  const float* samples(std::int32_t k, std::int32_t offset) const {
+    return ground_.line(line_at(k)) + lane_ + offset;
+  }
+  bool is_off_grid(std::int32_t offset) const {
+    return lane_ + offset + kBundle < 0 || lane_ + offset > ground_.lanes() - 1;
+  }
+
+  /// Squares begin where blocks do.
+  std::int32_t last_near_line() const {
+    std::int32_t k = std::min(kNearLines, reach_);
+    while (k < reach_ && !begins_block(k + 1, MarchGround::kLeastLevel)) ++k;
+    return k;
+  }
+  bool begins_block(std::int32_t k, int level) const {
+    const std::int32_t line = line_at(k) + (fan_.line_step > 0 ? 0 : 1);
+    return (line & ((1 << level) - 1)) == 0;
+  }
+
+  /// The first lines, at once for all that all bundles of the stripe have alike.
+  void cross_near(std::int32_t near) {
+    const std::int32_t last = std::min(near + 1, reach_);
+    for (auto k = static_cast<std::int32_t>(near_end_.size()); k <= last; ++k) {
+      const Step& step = step_at(k);
+      const std::ptrdiff_t shift = (first_line_ - step.line) * ground_.stride();
+      const auto keep = [&](const Crossing& crossing) {
+        near_.push_back(crossing);
+        near_.back().a += shift;
+        near_.back().b += shift;
+      };
+      if (step.is_between_sure) std::for_each_n(step.between.begin(), step.betweens, keep);
+      if (step.is_line_sure) keep(step.at_line);
+      if (!step.is_between_sure || !step.is_line_sure) unsure_.push_back(k);
+      near_end_.push_back(near_.size());
+    }
+    const std::size_t count = near_end_[static_cast<std::size_t>(last)];
+    const std::ptrdiff_t shift = (line_ - first_line_) * ground_.stride();
+    if (search_.measures_distance)
+      meet_and_measure(near_.data(), count, shift, kAllGroups, *rays_);
+    else
+      meet(near_.data(), count, shift, kAllGroups, *rays_);
+    for (const std::int32_t k : unsure_) {
+      if (k > last) break;
+      const Step& step = step_at(k);
+      if (!step.is_between_sure) cross_between(k, kAllGroups);
+      if (!step.is_line_sure) cross_line(k, kAllGroups);
+    }
+  }
+
+  /// Some lines at growing distances, so that low bounds are good before squares are asked. They
+  /// are lines that the neighbouring bundles cross too, where they can be.
+  void cross_some(std::int32_t first) {
+    notes_void_ = false;  // out of order here
+    for (std::int32_t k = first; k <= reach_;) {
+      cross_line(k, kAllGroups);
+      const std::int32_t step = std::max(k / kDistanceInSteps, 2);
+      const int level = std::bit_width(static_cast<unsigned>(step)) - 1;
+      k += 1 << level;
+      while (k <= reach_ && !begins_block(k, level)) ++k;
+    }
+    flush(kAllGroups);
+    notes_void_ = ground_.has_void();
+  }
+
+  void list_squares(std::int32_t first) {
+    spans_.clear();
+    int level = MarchGround::kLeastLevel;
+    for (std::int32_t k = first; k <= reach_;) {
+      while (level < ground_.greatest_level() && (kDistanceInSquares << (level + 1)) <= k &&
+             begins_block(k, level + 1))
+        ++level;
+      const Span span{level, line_at(k) >> level, k, std::min(k + (1 << level) - 1, reach_)};
+      const double at = place(k), end = at + place_step(k) * (kBundle - 1);
+      if (std::min(at, end) + lane_ > ground_.lanes() + kSwerveLanes ||
+          std::max(at, end) + lane_ + kBundle < -kSwerveLanes)
+        return;  // all rays have left the grid
+      spans_.push_back(span);
+      k = span.last + 1;
+    }
+  }
+
+  void search_span(const Span& span, unsigned groups) {
+    Square square;
+    unsigned open = groups;
+    if (!make_square(span, square)) return;
+    if (square.count > 0) {
+      open = may_block(square, search_.tolerance, groups, *rays_);
+      if (ground_.has_void()) open |= note_void_of(span, square, groups & ~open);
+    }
+    if (open == 0) return;
+    if (span.level == MarchGround::kLeastLevel) {
+      cross_lines(span.first, span.last, open);
+      return;
+    }
+    const std::int32_t middle = span.first + (1 << (span.level - 1));
+    const auto part = [&](std::int32_t first, std::int32_t last) {
+      search_span({span.level - 1, line_at(first) >> (span.level - 1), first, last}, open);
+    };
+    part(span.first, std::min(span.last, middle - 1));
+    if (middle <= span.last) part(middle, span.last);
+  }
+
+  /// The squares that hold all that the rays can meet within a span. Count 0: too many of them.
+  /// @return false where the rays meet nothing there
+  bool make_square(const Span& span, Square& square) const {
+    const std::int32_t before = span.first - 1, after = std::min(span.last + 1, fan_.reach());
+    const LaneRange &from = lanes_at(before), &to = lanes_at(after);
+    const double half = (after - before) / 2.0, bulge = fan_.bulge * half * half;
+    const std::int32_t more = bulge <= kWindowMargin ? 0 : static_cast<std::int32_t>(bulge) + 1;
+    const std::int32_t first = std::min(from.first, to.first) - more;
+    const std::int32_t last = std::max(from.last, to.last) + more;
+    square.count = 0;
+    square.inverse_near = static_cast<float>(inverse_run(span.first));
+    square.inverse_far = static_cast<float>(inverse_run(span.last));
+    if (lane_ + last + kBundle < 0 || lane_ + first > ground_.lanes() - 1) return false;
+    const std::int32_t side = 1 << span.level;
+    const float* highest = ground_.highest(span.level, span.block);
+    int count = 0;
+    for (std::int32_t at = clamped(first);;) {
+      if (count == kMostSquares) return true;
+      square.highest[count++] = highest + lane_ + at;
+      if (at + side > last) break;
+      at = std::min(at + side, std::max(clamped(last - side + 1), at + 1));
+    }
+    square.count = count;
+    return true;
+  }
+
+  /// Samples on either side of all places where the rays cross a line, from the bundle's first
+  /// ray's, with kWindowMargin to spare.
+  struct LaneRange {
+    std::int32_t stripe = 0;
+    std::int32_t first = 0, last = 0;
+  };
+  const LaneRange& lanes_at(std::int32_t k) const {
+    LaneRange& range = lane_ranges_[static_cast<std::size_t>(k)];
+    if (range.stripe == stripe_) return range;
+    const double at = place(k), end = at + place_step(k) * (kBundle - 1);
+    const double margin = slack(k) + kWindowMargin;
+    range.stripe = stripe_;
+    range.first = static_cast<std::int32_t>(std::floor(std::min(at, end) - margin));
+    range.last = static_cast<std::int32_t>(std::floor(std::max(at, end) + margin)) + 1;
+    return range;
+  }
+
+  /// Lane offsets at which a bundle can be read.
+  std::int32_t clamped(std::int32_t offset) const {
+    return std::clamp(offset, -MarchGround::kPad - lane_,
+                      ground_.lanes() + MarchGround::kPad - kBundle - lane_);
+  }
+
+  /// Groups, of those that are not opened anyway, that must be because there is void.
+  unsigned note_void_of(const Span& span, const Square& square, unsigned groups) {
+    unsigned open = 0;
+    const std::uint8_t* any_void = ground_.any_void(span.level, span.block);
+    const float* highest = ground_.highest(span.level, span.block);
+    for (int g = 0; g < kGroups; ++g) {
+      bool found = false;
+      for (int i = 0; i < square.count; ++i)
+        for (int ray = g * kGroup; ray < (g + 1) * kGroup; ++ray)
+          found |= any_void[square.highest[i] - highest + ray] != 0 && rays_->void_before[ray] <= 0;
+      if (found) open |= 1U << g & groups;
+    }
+    note_ground_behind(square, groups & ~open, *rays_);
+    return open;
+  }
+
+  /// Crosses lines and what lies between them and their neighbours.
+  void cross_lines(std::int32_t first, std::int32_t last, unsigned groups) {
+    for (std::int32_t k = first; k <= last; ++k) {
+      cross_between(k, groups);
+      cross_line(k, groups);
+    }
+    if (last < reach_) cross_between(last + 1, groups);
+    flush(groups);
+  }
+
+  /// Crossings that all rays of a bundle have for certain, alike for the bundles of a stripe but
+  /// for the lines' numbers.
+  struct Step {
+    std::int32_t stripe = 0;  ///< that it holds for
+    bool is_line_sure = false, is_between_sure = false;
+    std::int32_t line = 0;  ///< of the bundle that it was made for
+    int betweens = 0;
+    double drift = 0;  ///< relative error of the runs between lines
+    Crossing at_line;
+    std::array<Crossing, 2> between;
+  };
+
+  Step& step_at(std::int32_t k) {
+    Step& step = steps_[static_cast<std::size_t>(k)];
+    if (step.stripe == stripe_) return step;
+    step.stripe = stripe_;
+    step.line = line_;
+    step.is_line_sure = make_line(k, step);
+    step.betweens = 0;
+    step.drift = 0;
+    step.is_between_sure = make_between(k, step);
+    if (step.is_between_sure) drift_ = std::max(drift_, step.drift);
+    return step;
+  }
+  std::ptrdiff_t shift_of(const Step& step) const { return (line_ - step.line) * ground_.stride(); }
+
+  void cross_line(std::int32_t k, unsigned groups) {
+    const Step& step = step_at(k);
+    if (step.is_line_sure)
+      add(step.at_line, shift_of(step), groups);
+    else
+      cross_loosely(k, 0, kBundle);
+  }
+
+  /// @return false where some ray is near a sample or in another segment
+  bool make_line(std::int32_t k, Step& to) const {
+    const double at = place(k), step = place_step(k), slack_lanes = slack(k);
+    const double near = exact_ ? 0 : 2 * slack_lanes + kNearSample;
+    const double end = at + step * (kBundle - 1);
+    const double whole = std::floor(std::min(at, end));
+    const auto offset = static_cast<std::int32_t>(whole);
+    if (is_off_grid(offset)) return false;
+    if (std::min(at, end) - whole < near || std::max(at, end) - whole > 1 - near) return false;
+    const float* a = samples(k, offset);
+    const bool on_samples = exact_ && at == whole;
+    to.at_line = {a,
+                  on_samples ? a : a + 1,
+                  static_cast<float>(at - whole),
+                  static_cast<float>(step),
+                  static_cast<float>(inverse_run(k)),
+                  0,
+                  static_cast<float>(slack_lanes * inverse_run(k))};
+    return true;
+  }
+
+  /// Rays that meet a line near samples or in several segments.
+  void cross_loosely(std::int32_t k, int first_ray, int end_ray) {
+    const double step = place_step(k), at = place(k) + step * first_ray;
+    const double end = at + step * (end_ray - first_ray - 1);
+    const double reach = slack(k) + kNearSample / 4;
+    const double base = std::floor(std::min(at, end) - 2 * reach);
+    if (std::max(at, end) + 2 * reach > base + 2 && end_ray - first_ray > 1) {
+      const int middle = (first_ray + end_ray) / 2;
+      cross_loosely(k, first_ray, middle);
+      cross_loosely(k, middle, end_ray);
+      return;
+    }
+    const auto offset = static_cast<std::int32_t>(base);
+    if (is_off_grid(offset)) return;
+    const LooseCrossing crossing{first_ray,
+                                 end_ray,
+                                 samples(k, offset),
+                                 static_cast<float>(place(k) - base),
+                                 static_cast<float>(step),
+                                 static_cast<float>(reach),
+                                 static_cast<float>(inverse_run(k))};
+    meet_loosely(crossing, *rays_);
+    if (notes_void_) note_void_loosely(crossing, *rays_);
+  }
+
+  /// Segments that join a line's samples to those of the line before.
+  void cross_between(std::int32_t k, unsigned groups) {
+    const Step& step = step_at(k);
+    if (!step.is_between_sure) {
+      visit_between(k, [&](const BetweenPlace& place) { add_unsurely(k, place, groups); });
+      return;
+    }
+    for (int i = 0; i < step.betweens; ++i)
+      add(step.between[static_cast<std::size_t>(i)], shift_of(step), groups);
+  }
+
+  /// Where rays cross between the k-th line and the one before: in column `lane_offset`, the first
+  /// and the last ray at a share of the way.
+  struct BetweenPlace {
+    std::int32_t lane_offset;
+    double at, end, reach;
+    bool anywhere;  ///< the share is not known at all
+  };
+
+  template <typename Visit>
+  void visit_between(std::int32_t k, const Visit& visit) const {
+    const double from = place(k - 1), to = place(k);
+    const double last_from = from + place_step(k - 1) * (kBundle - 1);
+    const double last_to = to + place_step(k) * (kBundle - 1);
+    const double along = to - from, last_along = last_to - last_from;
+    constexpr double kParallel = 1e-9;
+    const bool is_parallel = std::abs(along) < kParallel || along * last_along <= 0;
+    if (is_parallel && exact_) return;
+    const auto [low, high] = std::minmax({from, last_from, to, last_to});
+    const double slack_lanes = slack(k);
+    const auto first = static_cast<std::int32_t>(std::ceil(low - slack_lanes));
+    const auto last = static_cast<std::int32_t>(std::floor(high + slack_lanes));
+    if (first > last) return;
+    const double bent = is_parallel ? 0 : (last_along - along) / along;
+    const double reach =
+        is_parallel ? 1 : std::min(1.0, slack_lanes / std::abs(along) + bent * bent / 4);
+    // In the order of the rays, which void asks for.
+    const std::int32_t step = along < 0 ? -1 : 1;
+    for (std::int32_t n = 0; n <= last - first; ++n) {
+      const std::int32_t j = (step > 0 ? first : last) + n * step;
+      // Not the cell's own column at the begin of its ray.
+      if ((k == 1 && j == 0) || is_off_grid(j)) continue;
+      const BetweenPlace found{j, is_parallel ? 0.5 : (j - from) / along,
+                               is_parallel ? 0.5 : (j - last_from) / last_along, reach,
+                               reach > kSureReach};
+      if (std::max(found.at, found.end) < -reach || std::min(found.at, found.end) > 1 + reach)
+        continue;
+      visit(found);
+    }
+  }
+
+  /// @return false where it is not certain that each ray crosses
+  bool make_between(std::int32_t k, Step& to) const {
+    bool is_sure = true;
+    visit_between(k, [&](const BetweenPlace& found) {
+      const double near = 2 * found.reach + kNearSample;
+      const double least = std::min(found.at, found.end), most = std::max(found.at, found.end);
+      is_sure = is_sure && !found.anywhere && least >= near && most <= 1 - near &&
+                static_cast<std::size_t>(to.betweens) < to.between.size();
+      if (!is_sure) return;
+      const double inverse = 1 / run_at(k, found.at), last_inverse = 1 / run_at(k, found.end);
+      to.between[static_cast<std::size_t>(to.betweens++)] = {
+          samples(k - 1, found.lane_offset),
+          samples(k, found.lane_offset),
+          static_cast<float>(found.at),
+          static_cast<float>((found.end - found.at) / (kBundle - 1)),
+          static_cast<float>(inverse),
+          static_cast<float>((last_inverse - inverse) / (kBundle - 1)),
+          static_cast<float>(found.reach * inverse)};
+      to.drift = std::max(to.drift, found.reach / (k - 1 + least));
+    });
+    return is_sure;
+  }
+
+  /// One of several segments of which some are not crossed by all rays for certain.
+  void add_unsurely(std::int32_t k, const BetweenPlace& found, unsigned groups) {
+    const float* a = samples(k - 1, found.lane_offset);
+    const float* b = samples(k, found.lane_offset);
+    if (found.anywhere) {
+      // No place on it is seen higher than both of its ends.
+      const auto inverse = static_cast<float>(inverse_run(k));
+      add_possible({a, b, 1, 0, 0, inverse, inverse}, groups);
+      if (k == 1) return;
+      const auto before = static_cast<float>(inverse_run(k - 1));
+      add_possible({a, b, 0, 0, 0, before, before}, groups);
+      return;
+    }
+    const double least = std::min(found.at, found.end), most = std::max(found.at, found.end);
+    add_possible({a, b, static_cast<float>(found.at),
+                  static_cast<float>((found.end - found.at) / (kBundle - 1)),
+                  static_cast<float>(found.reach),
+                  static_cast<float>(1 / run_at(k, std::max(least - found.reach, 0.0))),
+                  static_cast<float>(1 / run_at(k, std::min(most + found.reach, 1.0)))},
+                 groups);
+  }
+
+  /// Metres to a place at a share of the way from the line before to the k-th.
+  double run_at(std::int32_t k, double share) const {
+    const double from = k == 1 ? 0 : 1 / inverse_run(k - 1);
+    const double step = 1 / inverse_run(k) - from;
+    constexpr double kLeastShare = 0.01;  // of a line: nothing is met nearer
+    return std::max(from + share * step, kLeastShare * step);
+  }
+
+  /// @param shift  of the samples, from where the crossing was made
+  void add(const Crossing& crossing, std::ptrdiff_t shift, unsigned groups) {
+    Crossing& added = crossings_[count_++];
+    added = crossing;
+    added.a += shift;
+    added.b += shift;
+    if (notes_void_) note_void(added.a, added.b, groups, *rays_);
+    if (count_ == crossings_.size()) flush(groups);
+  }
+  void flush(unsigned groups) {
+    if (search_.measures_distance)
+      meet_and_measure(crossings_.data(), count_, 0, groups, *rays_);
+    else
+      meet(crossings_.data(), count_, 0, groups, *rays_);
+    count_ = 0;
+  }
+  void add_possible(const PossibleCrossing& crossing, unsigned groups) {
+    if (notes_void_) note_void(crossing.a, crossing.b, groups, *rays_);
+    meet_high(crossing, groups, *rays_);
+  }
+
+  static constexpr int kMostSquares = 8;
+  static constexpr double kSwerveLanes = 64;
+  static constexpr double kSureReach = 0.05;
+  static constexpr double kWindowMargin = 1e-3;  ///< lanes
+  static constexpr std::int32_t kMostStripeLines = 16;
+  static constexpr double kStripeSlack = 4e-5;  ///< lanes per line crossed
+
+  const MarchGround& ground_;
+  const RayFan& fan_;
+  const MarchTile& tile_;
+  const MarchSearch& search_;
+  const bool exact_;
+  std::int32_t lane_ = 0, line_ = 0, reach_ = 0;
+  double turn_ = 0, stripe_slack_ = 0;
+  std::int32_t stripe_ = 0;
+  double drift_ = 0;
+  std::vector<Step> steps_;  ///< by line crossed
+  mutable std::vector<LaneRange> lane_ranges_;
+  std::int32_t first_line_ = 0;
+  std::vector<Crossing> near_;         ///< of the stripe's first line
+  std::vector<std::size_t> near_end_;  ///< in near_, by line crossed
+  std::vector<std::int32_t> unsure_;   ///< lines crossed that near_ does not have whole
+  RayBundle* rays_ = nullptr;
+  std::vector<Span> spans_;
+  std::array<Crossing, 64> crossings_;
+  std::size_t count_ = 0;
+  bool notes_void_ = false;
+};
+
+/// Eyes over a line's samples; rays without one take no part.
+void place_eyes(const GroundGrid& grid, const MarchGround& ground, std::int32_t lane,
+                std::int32_t line, double height_m, RayBundle& rays) {
+  const float* z = ground.line(line) + lane;
+  for (int i = 0; i < kBundle; ++i) {
+    const bool known = lane + i < ground.lanes() && MarchGround::is_ground(z[i]);
+    rays.eye_z[i] = known ? z[i] : 0;
+    if (known && height_m > 0) {
+      const bool rows = ground.march() == March::kOverRows;
+      const double raised_z_m =
+          grid.raised(rows ? lane + i : line, rows ? line : lane + i, height_m).z_m;
+      rays.eye_z[i] = static_cast<float>(raised_z_m - ground.middle_z_m());
+    }
+    rays.low[i] = known ? MarchGround::kNothing : -MarchGround::kNothing;
+    rays.slope[i] = rays.high[i] = rays.rest[i] = rays.low[i];
+    rays.error[i] = 0;
+    rays.slope_run[i] = rays.run[i] = 0;
+    rays.over_void[i] = 0;
+    rays.void_before[i] = known ? 0 : 1;
+  }
+}
+
+/// Of the bundle whose first lane is the tile's i-th.
+void write_elevations(const MarchGround& ground, const RayFan& fan, const MarchTile& tile,
+                      std::int32_t i, std::int32_t line, const RayBundle& rays, double drift,
+                      const MarchSearch& search, TileHorizons& horizons) {
+  const double p = i - (tile.lanes - 1) / 2.0;
+  const double q = line - tile.first_line - (tile.lines - 1) / 2.0;
+  const double z_m = ground.middle_z_m() - fan.middle_z_m;
+  const double shrink = 1 / fan.stretch.at(p, q);
+  const double nearest = fan.reach() > 0 ? fan.inverse_run[1] : 0;
+  const ElevationRow row{static_cast<float>(fan.level.at(p, q) + fan.level_z * z_m),
+                         static_cast<float>(fan.level.per_lane),
+                         static_cast<float>(fan.rise.at(p, q) + fan.rise_z * z_m),
+                         static_cast<float>(fan.rise.per_lane),
+                         static_cast<float>(fan.level_z),
+                         static_cast<float>(fan.rise_z),
+                         static_cast<float>(fan.bend),
+                         static_cast<float>(shrink),
+                         static_cast<float>(-fan.stretch.per_lane * shrink * shrink),
+                         static_cast<float>(fan.tangent_error),
+                         static_cast<float>(4 * ground.rounding_m() * nearest),
+                         static_cast<float>(drift)};
+  std::array<std::int16_t, kBundle> estimate, lower, upper;
+  elevations(row, rays, estimate.data(), lower.data(), upper.data());
+  const auto count = static_cast<std::ptrdiff_t>(std::min(kBundle, tile.lanes - i));
+  const std::size_t to =
+      static_cast<std::size_t>(line - tile.first_line) * static_cast<std::size_t>(tile.lanes) +
+      static_cast<std::size_t>(i);
+  std::copy_n(estimate.begin(), count, &horizons.estimate[to]);
+  std::copy_n(lower.begin(), count, &horizons.lower[to]);
+  std::copy_n(upper.begin(), count, &horizons.upper[to]);
+  if (search.measures_distance)
+    for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k)
+      horizons.run_m[to + k] = rays.high[k] > rays.slope[k] ? rays.run[k] : rays.slope_run[k];
+}
+
+}  // namespace
+
+void march_tile(const GroundGrid& grid, const MarchGround& ground, const RayFan& fan,
+                const MarchTile& tile, const MarchSearch& search, TileHorizons& horizons) {
+  const auto lanes = static_cast<std::size_t>(tile.lanes);
+  const std::size_t cells = lanes * static_cast<std::size_t>(tile.lines);
+  horizons.estimate.resize(cells);
+  horizons.lower.resize(cells);
+  horizons.upper.resize(cells);
+  if (search.measures_distance) horizons.run_m.resize(cells);
+  BundleMarch march(ground, fan, tile, search);
+  RayBundle rays;
+  const std::int32_t stripe_lines = march.stripe_lines();
+  const std::int32_t end_line = tile.first_line + tile.lines;
+  for (std::int32_t stripe = tile.first_line; stripe < end_line; stripe += stripe_lines) {
+    const std::int32_t stripe_end = std::min(stripe + stripe_lines, end_line);
+    for (std::int32_t i = 0; i < tile.lanes; i += kBundle) {
+      march.begin_stripe(tile.first_lane + i, stripe, stripe_end - stripe);
+      for (std::int32_t line = stripe; line < stripe_end; ++line) {
+        place_eyes(grid, ground, tile.first_lane + i, line, search.eye_height_m, rays);
+        march.run(line, rays);
+        write_elevations(ground, fan, tile, i, line, rays, march.drift(), search, horizons);
+      }
+    }
+  }
+}
+
+}  // namespace scarp
