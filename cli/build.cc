@@ -114,7 +114,6 @@ class Build {
       together.seed = options_.seed;
       together.group_triangles = group_triangles;
       together.min_group_triangles = options_.min_group_triangles;
-      if (!has_certified(options_.horizon)) together.compactness = kCompactnessForStewart;
       groups_ = build_groups(mesh_.tin, horizon_, together, progress, &grouping_);
     } else {
       CrystalOptions crystals;

@@ -107,10 +107,7 @@ class Comparison {
  private:
   void grow() {
     const Progress progress = bar_.stage("groups");
-    HiddenTogetherOptions growth = growth_of(scene_.scene.description());
-    certified_leaves_ = grow_hidden_together(scene_.tin, growth, progress);
-    growth.compactness = kCompactnessForStewart;
-    thesis_leaves_ = grow_hidden_together(scene_.tin, growth, progress);
+    leaves_ = grow_hidden_together(scene_.tin, growth_of(scene_.scene.description()), progress);
   }
 
   void judge() {
@@ -147,8 +144,8 @@ class Comparison {
         continue;
       }
       const Stopwatch watch;
-      const Groups groups = build_group_tree(
-          scene_.tin, stewart_horizons(scene_.tin.vertices, layout, {}), thesis_leaves_);
+      const Groups groups =
+          build_group_tree(scene_.tin, stewart_horizons(scene_.tin.vertices, layout, {}), leaves_);
       setting.seconds = watch.seconds();
       part_s = setting.seconds / parts;
       setting.bytes_per_triangle = bytes_a_triangle(region_bytes(groups, "thesis"));
@@ -162,7 +159,7 @@ class Comparison {
   std::vector<Setting> certified_settings() const {
     const std::size_t triangles = scene_.tin.triangles.size();
     CertifiedSettings usual;
-    usual.sectors = sectors_within(kCertifiedBytes, triangles, certified_leaves_.count);
+    usual.sectors = sectors_within(kCertifiedBytes, triangles, leaves_.count);
     const auto with_fans = [&](int fans) {
       Setting setting{"certified", fmt::format("{} fans", fans), {}, usual};
       setting.certified->fans = fans;
@@ -171,7 +168,7 @@ class Comparison {
     };
     const auto with_bytes = [&](double bytes) {
       Setting setting{"certified", "", {}, usual};
-      setting.certified->sectors = sectors_within(bytes, triangles, certified_leaves_.count);
+      setting.certified->sectors = sectors_within(bytes, triangles, leaves_.count);
       setting.label = setting.bytes_label = fmt::format("{} sectors", setting.certified->sectors);
       return setting;
     };
@@ -196,8 +193,8 @@ class Comparison {
 
   void run_certified() {
     Groups groups;
-    groups.group_of_triangle = certified_leaves_.group_of_triangle;
-    groups.leaf_count = certified_leaves_.count;
+    groups.group_of_triangle = leaves_.group_of_triangle;
+    groups.leaf_count = leaves_.count;
     CertifyCost cost = measure_certify_cost(
         scene_.tin, groups, certified_settings()[0].certified.value(), bar_.stage("measure"));
     for (Setting& setting : certified_settings()) {
@@ -243,7 +240,7 @@ class Comparison {
   const LoadedScene& scene_;
   ProgressBar bar_;
   Stopwatch watch_;
-  LeafGroups certified_leaves_, thesis_leaves_;
+  LeafGroups leaves_;
   std::vector<TriangleIndex> all_triangles_;
   std::vector<JudgedEye> eyes_;
   std::vector<Setting> done_, left_out_;

@@ -14,11 +14,6 @@ struct GroupingReport {
   std::uint32_t orphans = 0;  ///< triangles that are always drawn
 };
 
-/// HiddenTogetherOptions::compactness for regions of method `stewart`: they are intersections over
-/// all of a group's vertices and lose more by distance than by what is seen. Certified regions lose
-/// less by distance: the usual one is theirs.
-inline constexpr double kCompactnessForStewart = 4;
-
 /// Groups that are hidden together and the tree above them, from a surface and its horizons.
 /// @param report  may be null
 /// Requires, cost, source: see grow_hidden_together and build_group_tree.

@@ -1,6 +1,6 @@
 // What certified regions cull of what can be culled, what they cost, and how fast they answer.
 //   certified_bench [--dem NAME[,NAME]] [--vertices N] [--eyes N] [--group-triangles N] [--fans N]
-//                   [--sectors N] [--bytes N] [--patch X] [--threads N] [--json]
+//                   [--compactness X] [--sectors N] [--bytes N] [--patch X] [--threads N] [--json]
 //   certified_bench --scale [--triangles N[,N]] [...]
 // On every listed DEM groups are grown hidden together, as by the product, and squares of a
 // quadtree are made with the same mean size; both are certified with the same settings. The exact
@@ -72,6 +72,7 @@ struct Settings {
   int eyes = 30;
   std::string dems;
   std::uint32_t group_triangles = 128;
+  double compactness = HiddenTogetherOptions{}.compactness;
   double bytes = kCertifiedBytes;
   std::optional<int> sectors;  // instead of bytes
   CertifiedSettings certified;
@@ -186,6 +187,7 @@ struct Measured {
 Measured measure(const test::ListedDem& listed, const Tin& tin, const Settings& settings) {
   HiddenTogetherOptions together;
   together.group_triangles = settings.group_triangles;
+  together.compactness = settings.compactness;
   std::array<Partition, 2> parts;
   parts[0].name = "crystals";
   const double begun_s = user_seconds();
@@ -416,6 +418,7 @@ int run_scale(const Settings& settings) {
     Partition part;
     HiddenTogetherOptions together;
     together.group_triangles = settings.group_triangles;
+    together.compactness = settings.compactness;
     const double begun_s = user_seconds();
     part.groups = grow_hidden_together(*tin, together);
     const double grown_s = user_seconds() - begun_s;
@@ -456,6 +459,8 @@ bool take_value(Settings& settings, const std::string& name, const char* value) 
     settings.sectors = whole(8);
   } else if (name == "--bytes") {
     settings.bytes = std::atof(value);
+  } else if (name == "--compactness") {
+    settings.compactness = std::atof(value);
   } else if (name == "--patch") {
     settings.certified.patch = std::atof(value);
   } else if (name == "--threads") {

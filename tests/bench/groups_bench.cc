@@ -134,7 +134,6 @@ nlohmann::json measure(const test::ListedDem& listed, const Tin& tin, const Sett
       {"hidden_groups", ratios_of(shares[2], shares[1])}};
   if (settings.regions) {
     const HorizonTable horizon = stewart_horizons(tin.vertices, {}, {});
-    options.compactness = kCompactnessForStewart;
     row["stewart_regions"] =
         ratios_of(cull(tin, horizon, settings.eyes, grow_hidden_together(tin, options)),
                   cull(tin, horizon, settings.eyes, squares));
