@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <functional>
@@ -175,6 +176,73 @@ Arena maze(SplitMix64& random) {
   return arena;
 }
 
+/// A maze of narrow and broad cells, and groups of a few triangles near each other: a long border
+/// with a short one behind it or before it, so that some rays over one cross the other and some
+/// pass beside it.
+Arena uneven_maze(SplitMix64& random) {
+  Arena arena = maze(random);
+  const double widths_m[] = {2, 5, 40};
+  std::array<double, 20> column_m{}, row_m{};
+  for (std::size_t i = 1; i < column_m.size(); ++i) {
+    column_m[i] = column_m[i - 1] + widths_m[random.below(3)];
+    row_m[i] = row_m[i - 1] + widths_m[random.below(3)];
+  }
+  for (Position& p : arena.tin.vertices) {
+    p.x_m = column_m[static_cast<std::size_t>(p.x_m / kCellM)];
+    p.y_m = row_m[static_cast<std::size_t>(p.y_m / kCellM)];
+  }
+  const auto& triangles = arena.tin.triangles;
+  arena.group_of_triangle.assign(triangles.size(), kNone);
+  for (GroupIndex group = 0; group < arena.groups; ++group) {
+    const auto first = random.below(triangles.size());
+    arena.group_of_triangle[first] = group;
+    const Position& from = arena.tin.vertices[triangles[first][0]];
+    for (int added = 0, tries = 0; added < 3 && tries < 400; ++tries) {
+      const auto other = random.below(triangles.size());
+      const Position& to = arena.tin.vertices[triangles[other][0]];
+      if (arena.group_of_triangle[other] != kNone ||
+          std::hypot(to.x_m - from.x_m, to.y_m - from.y_m) > 50)
+        continue;
+      arena.group_of_triangle[other] = group;
+      ++added;
+    }
+  }
+  for (GroupIndex group = 0; group < arena.groups; ++group)  // no group is empty
+    arena.group_of_triangle[random.below(triangles.size() / 3) * 3 + group] = group;
+  arena.least_fans = 16;
+  arena.least_sectors = 256;
+  return arena;
+}
+
+/// Groups of neighbouring triangles with much relief of their own, between walls: all the ground
+/// that rays over a piece of the border come from has to count, however they come.
+Arena rough_patches(SplitMix64& random) {
+  const std::int32_t side = whole(random, 12, 18), aisle = whole(random, 3, 6);
+  const double rough_m = 40 * random.unit(), wall_m = 30 + 60 * random.unit();
+  const double open_share = 0.05 + 0.15 * random.unit();
+  Tin tin = triangulated(grid_of(side, side, kCellM,
+                                 [&](std::int32_t column, std::int32_t row) {
+                                   const bool is_wall = column % aisle == 1 || row % aisle == 2;
+                                   return rough_m * random.unit() +
+                                          (is_wall && random.unit() > open_share ? wall_m : 0);
+                                 }),
+                         1 + random.below(3));
+  Arena arena = arena_of(std::move(tin), 3, [](double, double) { return kNone; });
+  const std::size_t triangles = arena.tin.triangles.size();
+  for (GroupIndex group = 0; group < arena.groups; ++group) {
+    auto at = static_cast<TriangleIndex>(random.below(triangles));
+    for (std::uint64_t steps = 2 + random.below(20); steps > 0; --steps) {
+      arena.group_of_triangle[at] = group;
+      const TriangleIndex next = arena.tin.neighbours[at][random.below(3)];
+      if (next != kNone) at = next;
+    }
+  }
+  for (GroupIndex group = 0; group < arena.groups; ++group)  // no group is empty
+    arena.group_of_triangle[random.below(triangles / 3) * 3 + group] = group;
+  arena.least_sectors = 64;
+  return arena;
+}
+
 Arena posts(SplitMix64& random) {
   const std::int32_t side = whole(random, 10, 16);
   Tin tin = triangulated(
@@ -277,6 +345,14 @@ TEST(CertifiedMargins, CourtWithOneGap) {
 
 TEST(CertifiedMargins, GroupsFarApartInAMaze) {
   EXPECT_GT(search_arenas(maze, 7100, 40, 100), 10'000U);
+}
+
+TEST(CertifiedMargins, LongAndShortBordersInAnUnevenMaze) {
+  EXPECT_GT(search_arenas(uneven_maze, 9090, 40, 100), 10'000U);
+}
+
+TEST(CertifiedMargins, RoughPatchesBetweenWalls) {
+  EXPECT_GT(search_arenas(rough_patches, 10'000, 40, 100), 10'000U);
 }
 
 TEST(CertifiedMargins, Posts) {
