@@ -124,6 +124,17 @@ std::optional<std::string> check_tin(const Tin& tin) {
   return check_edges(tin);
 }
 
+bool bends_downwards(const Tin& tin, TriangleIndex triangle, std::size_t corner) {
+  const auto& corners = tin.triangles[triangle];
+  const auto& beyond = tin.triangles[tin.neighbours[triangle][corner]];
+  const auto apex = std::find_if(beyond.begin(), beyond.end(), [&](VertexIndex v) {
+    return v != corners[(corner + 1) % 3] && v != corners[(corner + 2) % 3];
+  });
+  assert(apex != beyond.end());
+  return orient3d(tin.vertices[corners[0]], tin.vertices[corners[1]], tin.vertices[corners[2]],
+                  tin.vertices[*apex]) < 0;
+}
+
 Bounds bounds_of(std::span<const Position> positions) {
   assert(!positions.empty());
   Bounds bounds{positions[0], positions[0]};

@@ -38,6 +38,10 @@ void connect_neighbours(Tin& tin);
 /// without a triangle. Cost: O(n log n).
 std::optional<std::string> check_tin(const Tin& tin);
 
+/// Whether the surface bends downwards over the edge of a triangle opposite to a corner: the
+/// triangle beyond it falls below the plane of this one. Exact. Requires a triangle beyond.
+bool bends_downwards(const Tin& tin, TriangleIndex triangle, std::size_t corner);
+
 /// Least and greatest coordinates. Requires at least one vertex.
 struct Bounds {
   Position low;

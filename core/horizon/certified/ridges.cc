@@ -3,38 +3,29 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/geodesy/predicates.h"
-
 namespace scarp {
 
 RidgeEdges ridge_edges_of(const Tin& tin) {
   RidgeEdges ridges;
   ridges.first_around.assign(tin.vertices.size() + 1, 0);
+  // Each edge once, as the one opposite to a corner of its first triangle.
   const auto visit_edges = [&](auto visit) {
     for (TriangleIndex t = 0; t < tin.triangles.size(); ++t)
-      for (std::size_t i = 0; i < 3; ++i) {
-        const TriangleIndex other = tin.neighbours[t][i];
-        if (other == kNone || t < other)
-          visit(t, other, tin.triangles[t][(i + 1) % 3], tin.triangles[t][(i + 2) % 3]);
-      }
+      for (std::size_t i = 0; i < 3; ++i)
+        if (const TriangleIndex other = tin.neighbours[t][i]; other == kNone || t < other)
+          visit(t, i, tin.triangles[t][(i + 1) % 3], tin.triangles[t][(i + 2) % 3]);
   };
-  visit_edges([&](TriangleIndex t, TriangleIndex other, VertexIndex from, VertexIndex to) {
+  visit_edges([&](TriangleIndex t, std::size_t i, VertexIndex from, VertexIndex to) {
     ++ridges.first_around[from + 1];
     ++ridges.first_around[to + 1];
-    const auto& [a, b, c] = tin.triangles[t];
-    bool is_ridge = other == kNone;
-    if (!is_ridge)
-      for (const VertexIndex apex : tin.triangles[other])
-        is_ridge |=
-            apex != from && apex != to &&
-            orient3d(tin.vertices[a], tin.vertices[b], tin.vertices[c], tin.vertices[apex]) < 0;
-    if (is_ridge) ridges.edges.push_back({from, to});
+    if (tin.neighbours[t][i] == kNone || bends_downwards(tin, t, i))
+      ridges.edges.push_back({from, to});
   });
   for (std::size_t v = 0; v < tin.vertices.size(); ++v)
     ridges.first_around[v + 1] += ridges.first_around[v];
   ridges.around.resize(ridges.first_around.back());
   std::vector<std::uint32_t> next(ridges.first_around.begin(), ridges.first_around.end() - 1);
-  visit_edges([&](TriangleIndex, TriangleIndex, VertexIndex from, VertexIndex to) {
+  visit_edges([&](TriangleIndex, std::size_t, VertexIndex from, VertexIndex to) {
     ridges.around[next[from]++] = to;
     ridges.around[next[to]++] = from;
   });

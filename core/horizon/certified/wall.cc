@@ -20,30 +20,18 @@ class Chain {
   Chain(const RidgeEdges& ridges, const FanView& view, const Beam& beam, double slope)
       : ridges_(ridges), view_(view), beam_(beam), slope_(slope) {}
 
-  /// The vertices of the chain by rising v; nothing where it does not span the beam.
-  bool follow(const RidgeEdges::Edge& edge) {
+  /// @param vertices[out]  of the chain, by rising v
+  /// @return whether it spans the beam
+  bool follow(const RidgeEdges::Edge& edge, std::vector<VertexIndex>& vertices) const {
     VertexIndex low = edge[0], high = edge[1];
     if (place(low).v_m > place(high).v_m) std::swap(low, high);
     if (!is_crossed(place(low), place(high))) return false;
-    std::array<VertexIndex, kMostSteps> below;
-    std::size_t count = 0;
-    while (beam_.low.at(place(low)) >= 0) {
-      const auto next = highest_from(low, -1);
-      if (!next || count == kMostSteps) return false;
-      below[count++] = low = *next;
-    }
-    vertices.assign(below.rend() - static_cast<std::ptrdiff_t>(count), below.rend());
-    vertices.push_back(edge[0] == high ? edge[1] : edge[0]);
+    vertices.assign(1, low);
+    if (!extend(beam_.low, -1, vertices)) return false;
+    std::reverse(vertices.begin(), vertices.end());
     vertices.push_back(high);
-    for (int steps = 0; beam_.high.at(place(high)) >= 0; ++steps) {
-      const auto next = highest_from(high, 1);
-      if (!next || steps == kMostSteps) return false;
-      vertices.push_back(high = *next);
-    }
-    return true;
+    return extend(beam_.high, 1, vertices);
   }
-
-  std::vector<VertexIndex> vertices;
 
  private:
   const FanPlace& place(VertexIndex v) const { return view_.vertices[v]; }
@@ -52,6 +40,16 @@ class Chain {
   bool is_crossed(const FanPlace& p, const FanPlace& q) const {
     const double least = std::max(view_.fan.tan_half, kLeastTurn);
     return q.v_m - p.v_m > std::abs(q.u_m - p.u_m) * least + 8 * view_.error_m;
+  }
+
+  /// Appends vertices until one lies beyond a side of the beam.
+  bool extend(const HalfPlane& side_line, int side, std::vector<VertexIndex>& vertices) const {
+    for (int steps = 0; side_line.at(place(vertices.back())) >= 0; ++steps) {
+      const auto next = highest_from(vertices.back(), side);
+      if (!next || steps == kMostSteps) return false;
+      vertices.push_back(*next);
+    }
+    return true;
   }
 
   /// The edge that rises most across the beam, as sight lines of the slope see it.
@@ -78,16 +76,12 @@ class Chain {
 
 bool raise_wall(const RidgeEdges& ridges, const FanView& view, const Beam& beam,
                 std::span<const FanPlace> targets, std::uint32_t edge, double slope, Wall& wall) {
-  thread_local std::vector<VertexIndex> kept;
-  Chain chain(ridges, view, beam, slope);
-  chain.vertices.swap(kept);
-  const bool spans = chain.follow(ridges.edges[edge]);
-  kept.swap(chain.vertices);
-  if (!spans) return false;
+  const std::vector<VertexIndex>& chain = wall.chain;
+  if (!Chain(ridges, view, beam, slope).follow(ridges.edges[edge], wall.chain)) return false;
   wall.u_m = -HUGE_VAL;
   wall.planes.clear();
-  for (std::size_t i = 0; i + 1 < kept.size(); ++i) {
-    const FanPlace &a = view.vertices[kept[i]], &b = view.vertices[kept[i + 1]];
+  for (std::size_t i = 0; i + 1 < chain.size(); ++i) {
+    const FanPlace &a = view.vertices[chain[i]], &b = view.vertices[chain[i + 1]];
     double from = 0, to = 1;
     cut(beam.low.at(a), beam.low.at(b), from, to);
     cut(beam.high.at(a), beam.high.at(b), from, to);

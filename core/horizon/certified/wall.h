@@ -39,6 +39,7 @@ struct Beam {
 struct Wall {
   double u_m;
   std::vector<SkyPlane> planes;
+  std::vector<VertexIndex> chain;  ///< by rising v; its memory is reused
 };
 
 /// Raises a wall on a ridge: follows it both ways, along the edges that look highest, until it

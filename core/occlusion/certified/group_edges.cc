@@ -1,20 +1,9 @@
 #include "core/occlusion/certified/group_edges.h"
 
-#include <cassert>
 #include <numeric>
-
-#include "core/geodesy/predicates.h"
 
 namespace scarp {
 namespace {
-
-/// The corner of a triangle that is not on the edge from a to b.
-VertexIndex apex_over(const Tin& tin, TriangleIndex triangle, VertexIndex a, VertexIndex b) {
-  for (const VertexIndex corner : tin.triangles[triangle])
-    if (corner != a && corner != b) return corner;
-  assert(false);
-  return a;
-}
 
 /// Calls visit(group, edge, is_border) for each border of a group, directed with the group on the
 /// left, and once for each edge within one that bends downwards.
@@ -29,11 +18,8 @@ void visit_edges(const Tin& tin, std::span<const GroupIndex> group_of_triangle, 
       const TriangleIndex other = tin.neighbours[t][i];
       if (other == kNone || group_of_triangle[other] != group) {
         visit(group, GroupEdges::Edge{from, to}, true);
-      } else if (t < other) {
-        const VertexIndex apex = apex_over(tin, other, from, to);
-        if (orient3d(tin.vertices[corners[0]], tin.vertices[corners[1]], tin.vertices[corners[2]],
-                     tin.vertices[apex]) < 0)
-          visit(group, GroupEdges::Edge{from, to}, false);
+      } else if (t < other && bends_downwards(tin, t, i)) {
+        visit(group, GroupEdges::Edge{from, to}, false);
       }
     }
   }

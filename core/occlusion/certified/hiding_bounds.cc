@@ -36,7 +36,7 @@ constexpr float kEverything = std::numeric_limits<float>::infinity();
 using RingRow = std::array<float, kRings>;
 
 /// An edge is halved this often at most.
-constexpr int kMostHalvings = 6;
+constexpr std::size_t kMostHalvings = 6;
 
 /// Bounds are not worked on to lower others by less than this slope: they do so as they are.
 constexpr float kSlopeTolerance = 0.0003F;
@@ -162,8 +162,7 @@ class Bounding {
     }
     for (const Circle& circle : bounds_.circle) radius_m += circle.radius_m / groups;
     unit_m_ = std::sqrt(2 * area_m2 / static_cast<double>(tin.triangles.size()));
-    bounds_.lowest_m = bounds.low.z_m;
-    bounds_.highest_m = bounds.high.z_m;
+    lowest_m_ = bounds.low.z_m;
     // The finer rings where they reach over the whole surface.
     const double reach = std::hypot(width_m, depth_m) / radius_m;
     bounds_.layout = {options.sectors, reach < ring_start({8, 3}, kRings - 1) ? 3 : 2};
@@ -262,17 +261,16 @@ class Bounding {
     std::vector<FanEdge> crests{};
     std::vector<FanEdge> exits{};  // all that rays can leave over
     std::array<PieceTargets, kMostHalvings + 1> targets{};
+    std::vector<FanPlace> hull{};
     std::array<std::vector<Reached>, kMostHalvings + 1> reached_by_depth{};
-    int depth = 0;
+    std::size_t depth = 0;  // of halving
     std::vector<Sighted> sighted{};
     std::vector<CellPlane> planes{};
     std::vector<float> gradients{};
     Wall wall{};
 
-    std::vector<Reached>& reached() { return reached_by_depth[static_cast<std::size_t>(depth)]; }
-    const std::vector<Reached>& reached() const {
-      return reached_by_depth[static_cast<std::size_t>(depth)];
-    }
+    std::vector<Reached>& reached() { return reached_by_depth[depth]; }
+    const std::vector<Reached>& reached() const { return reached_by_depth[depth]; }
   };
 
   FanEdge in_fan(const FanView& view, const GroupEdges::Edge& edge) const {
@@ -288,8 +286,8 @@ class Bounding {
     look.centre =
         place_in(view.fan, circle.x_m - origin_x_m_, circle.y_m - origin_y_m_, look.height_m);
     for (std::size_t k = 0; k < kRings; ++k)
-      look.floor[k] = static_cast<float>((bounds_.lowest_m - look.height_m) / look.radius_m) *
-                      rings.near_inverse[k];
+      look.floor[k] =
+          static_cast<float>((lowest_m_ - look.height_m) / look.radius_m) * rings.near_inverse[k];
     for (const auto& edge : edges_.crests_of(group)) look.crests.push_back(in_fan(view, edge));
     for (const auto& edge : edges_.borders_of(group)) {
       const FanEdge exit = in_fan(view, edge);
@@ -301,7 +299,7 @@ class Bounding {
     });
     std::vector<std::uint32_t> all(look.crests.size());
     std::iota(all.begin(), all.end(), 0U);
-    for (const FanEdge& edge : look.exits) look_from_piece(look, {edge.a, edge.b, &edge}, all, 0);
+    for (const FanEdge& edge : look.exits) look_from_piece(look, {edge.a, edge.b, &edge}, all);
   }
 
   /// Whether every ray over the piece leaves the group once more, over one edge: then it has been
@@ -353,7 +351,7 @@ class Bounding {
       reached.begin = kRings, reached.end = 0;
       reached.best.fill(kNothing);
       if (look.depth == 0) continue;
-      for (const Reached& whole : look.reached_by_depth[static_cast<std::size_t>(look.depth) - 1])
+      for (const Reached& whole : look.reached_by_depth[look.depth - 1])
         if (whole.sector == reached.sector) reached.best = whole.best;
     }
     for (std::size_t k = 0; k < kRings; ++k)
@@ -449,9 +447,11 @@ class Bounding {
       raise_reached(look, ring_beyond(wall.u_m));
       return true;
     };
+    look.hull = targets.places;
+    leave_upper_hull(look.hull);
     const auto tangent_m = [&](double slope) {
       double base_m = -HUGE_VAL;
-      for (const FanPlace& p : targets.hull) base_m = std::max(base_m, p.z_m - slope * p.u_m);
+      for (const FanPlace& p : look.hull) base_m = std::max(base_m, p.z_m - slope * p.u_m);
       return base_m;
     };
     // A wall is raised on the last ridge before a ring that rises above all before it, if there
@@ -483,7 +483,7 @@ class Bounding {
         if (!is_open(look, ring, kRings)) return;
       }
       slope = HUGE_VAL;
-      for (const FanPlace& p : targets.hull)
+      for (const FanPlace& p : look.hull)
         slope = std::min(slope, (z_m - p.z_m) / std::max(u_m - p.u_m, kLatticeStepM));
       base_m = tangent_m(slope);
       look.sighted.push_back({next->edge, slope});
@@ -495,12 +495,11 @@ class Bounding {
   /// halves, before it lowers any.
   /// @param candidates  crests behind the edge
   void look_from_piece(Look& look, const ExitPiece& piece,
-                       std::span<const std::uint32_t> candidates, int depth) {
+                       std::span<const std::uint32_t> candidates) {
     if (is_passed(look, piece)) return;
-    look.depth = depth;
     const std::size_t lane = reach_from(look, piece);
     if (!is_open(look, 0, kRings)) return lower_cells(look);
-    PieceTargets& targets = look.targets[static_cast<std::size_t>(depth)];
+    PieceTargets& targets = look.targets[look.depth];
     find_targets(look.view, piece, look.crests, candidates, targets);
     if (targets.plane) {
       look.planes.assign(1, in_cells(look, *targets.plane, lane));
@@ -511,11 +510,13 @@ class Bounding {
     if (!is_open(look, 0, kRings)) return lower_cells(look);
     const double du_m = piece.b.u_m - piece.a.u_m, dv_m = piece.b.v_m - piece.a.v_m;
     const double size_m = options_.piece * unit_m_;
-    if (depth < kMostHalvings && du_m * du_m + dv_m * dv_m > size_m * size_m) {
+    if (look.depth < kMostHalvings && du_m * du_m + dv_m * dv_m > size_m * size_m) {
       const FanPlace middle{piece.a.u_m + du_m / 2, piece.a.v_m + dv_m / 2,
                             piece.a.z_m + (piece.b.z_m - piece.a.z_m) / 2};
-      look_from_piece(look, {piece.a, middle, piece.edge}, targets.crests, depth + 1);
-      look_from_piece(look, {middle, piece.b, piece.edge}, targets.crests, depth + 1);
+      ++look.depth;
+      look_from_piece(look, {piece.a, middle, piece.edge}, targets.crests);
+      look_from_piece(look, {middle, piece.b, piece.edge}, targets.crests);
+      --look.depth;
       return;
     }
     lower_cells(look);
@@ -540,7 +541,7 @@ class Bounding {
   float sagitta_ = 0;
   HidingBounds bounds_;
   double origin_x_m_ = 0, origin_y_m_ = 0;
-  double unit_m_ = 0;
+  double unit_m_ = 0, lowest_m_ = 0;
 };
 
 }  // namespace

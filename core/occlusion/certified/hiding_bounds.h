@@ -26,8 +26,6 @@ struct HidingOptions {
 /// under height_m + slope * distance. -infinity where nothing is known to be hidden.
 struct HidingBounds {
   PolarLayout layout;
-  double lowest_m = 0;           ///< of the ground
-  double highest_m = 0;          ///< of the ground
   std::vector<Circle> circle;    ///< [groups]
   std::vector<double> height_m;  ///< [groups]
   std::vector<float> slope;      ///< [groups * sectors * kRings]

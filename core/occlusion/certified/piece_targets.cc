@@ -24,8 +24,7 @@ HalfPlane ahead_of(const FanEdge& edge) {
   return {-nu * edge.a.u_m - nv * edge.a.v_m, nu, nv};
 }
 
-/// The region behind a piece that rays of the fan can come from, as far as it is not bounded by
-/// the beam's own lines.
+/// The region behind a piece that rays of the fan over it can come from.
 struct Wedge {
   HalfPlane low, high, behind;
 };
@@ -52,24 +51,6 @@ void open_piece(const FanView& view, const ExitPiece& piece, bool is_proper, Wed
     beam.ahead = {-high_u_m, 1, 0};
     wedge.behind = {high_u_m + 4 * view.error_m, -1, 0};
   }
-}
-
-/// Leaves the upper hull, by rising u.
-void leave_upper_hull(std::vector<FanPlace>& places) {
-  std::sort(places.begin(), places.end(), [](const FanPlace& p, const FanPlace& q) {
-    return p.u_m < q.u_m || (p.u_m == q.u_m && p.z_m > q.z_m);
-  });
-  std::size_t kept = 0;
-  for (const FanPlace& place : places) {
-    if (kept > 0 && places[kept - 1].u_m == place.u_m) continue;
-    while (kept > 1) {
-      const FanPlace &p = places[kept - 2], &q = places[kept - 1];
-      if ((q.z_m - p.z_m) * (place.u_m - p.u_m) > (place.z_m - p.z_m) * (q.u_m - p.u_m)) break;
-      --kept;
-    }
-    places[kept++] = place;
-  }
-  places.resize(kept);
 }
 
 }  // namespace
@@ -114,8 +95,23 @@ void find_targets(const FanView& view, const ExitPiece& piece, std::span<const F
   targets.plane.reset();
   if (is_proper && plane.is_held()) targets.plane = plane.plane(piece.a, piece.b);
   for (FanPlace& place : targets.places) place.z_m += 2 * view.height_error_m;
-  targets.hull = targets.places;
-  leave_upper_hull(targets.hull);
+}
+
+void leave_upper_hull(std::vector<FanPlace>& places) {
+  std::sort(places.begin(), places.end(), [](const FanPlace& p, const FanPlace& q) {
+    return p.u_m < q.u_m || (p.u_m == q.u_m && p.z_m > q.z_m);
+  });
+  std::size_t kept = 0;
+  for (const FanPlace& place : places) {
+    if (kept > 0 && places[kept - 1].u_m == place.u_m) continue;
+    while (kept > 1) {
+      const FanPlace &p = places[kept - 2], &q = places[kept - 1];
+      if ((q.z_m - p.z_m) * (place.u_m - p.u_m) > (place.z_m - p.z_m) * (q.u_m - p.u_m)) break;
+      --kept;
+    }
+    places[kept++] = place;
+  }
+  places.resize(kept);
 }
 
 }  // namespace scarp

@@ -43,7 +43,6 @@ struct PieceTargets {
   /// if it is strictly under the plane.
   std::optional<SkyPlane> plane;
   std::vector<FanPlace> places;       ///< corners of what is seen of the group, rounded up
-  std::vector<FanPlace> hull;         ///< of these in (u, z), the upper one, by rising u
   std::vector<std::uint32_t> crests;  ///< those of the candidates that touch the wedge
   Beam beam;                          ///< of the rays beyond the piece
 };
@@ -55,8 +54,11 @@ struct PieceTargets {
 /// Side: the plane never above the true one; places never below the ground.
 /// @param crests      edges of the group, in the fan's frame
 /// @param candidates  those that can matter
-/// Cost: O(candidates + found log found).
+/// Cost: O(candidates).
 void find_targets(const FanView& view, const ExitPiece& piece, std::span<const FanEdge> crests,
                   std::span<const std::uint32_t> candidates, PieceTargets& targets);
+
+/// Leaves the upper hull of places in (u, z), by rising u. Cost: O(n log n).
+void leave_upper_hull(std::vector<FanPlace>& places);
 
 }  // namespace scarp
