@@ -13,7 +13,9 @@
 #include "cli/loaded_scene.h"
 #include "cli/progress_bar.h"
 #include "cli/scene_culling.h"
+#include "core/culling/box_tree.h"
 #include "core/culling/image_culling.h"
+#include "core/culling/mask_culling.h"
 #include "core/error/error.h"
 #include "tiles/layers/png_image.h"
 #include "tiles/store/part_folder.h"
@@ -34,10 +36,11 @@ class EverythingInView : public CullingMethod {
   CullingAnswer all_;
 };
 
+constexpr char kPageName[] = "flight.html";
 constexpr float kSmallGapOpacity = 0.7F;
 
 std::vector<Contender> contenders_of(const LoadedScene& scene, const GroupBatches& batches,
-                                     const std::vector<std::string>& wanted) {
+                                     const BoxTree& tree, const std::vector<std::string>& wanted) {
   std::vector<Contender> all;
   const auto add = [&](const std::string& label, bool is_conservative, double prepare_s,
                        std::uint64_t bytes, auto make) {
@@ -53,6 +56,7 @@ std::vector<Contender> contenders_of(const LoadedScene& scene, const GroupBatche
           [&] { return culling_method(scene, method); });
   }
   add("hzb", true, 0, 0, [&] { return std::make_unique<HzbCulling>(scene.tin, batches); });
+  add("mask", false, 0, 0, [&] { return std::make_unique<MaskCulling>(scene.tin, batches, tree); });
   ImageCullingOptions hom;
   add("hom", false, 0, 0, [&] { return std::make_unique<HomCulling>(batches, hom); });
   hom.opacity = kSmallGapOpacity;
@@ -118,14 +122,15 @@ void print_table(const Flight& flight, const std::vector<Contender>& contenders)
 
 int run_fly(const FlyOptions& options) {
   const LoadedScene scene(options.scene);
-  PartFolder folder(options.output,
+  PartFolder folder(options.output, kPageName,
                     options.common.overwrite ? Existing::kReplace : Existing::kRefuse);
   const std::vector<Waypoint> path =
       options.path_file.empty()
           ? find_path(scene, route_of(options.route), options.frames, options.seed)
           : read_path(options.path_file);
   const GroupBatches batches(scene.tin, scene.groups);
-  std::vector<Contender> contenders = contenders_of(scene, batches, options.methods);
+  const BoxTree tree(batches);
+  std::vector<Contender> contenders = contenders_of(scene, batches, tree, options.methods);
 
   Lens lens;
   lens.width_px = options.width_px;
@@ -156,7 +161,7 @@ int run_fly(const FlyOptions& options) {
                               : std::filesystem::path(options.path_file).filename().string();
   folder.write("path.csv", to_csv(path));
   folder.write("frames.csv", flight_csv(flight, contenders));
-  folder.write("flight.html",
+  folder.write(kPageName,
                flight_page(flight, contenders,
                            fmt::format("{} over {}: {} frames of {} x {} pixels", way,
                                        std::filesystem::path(options.scene).filename().string(),

@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "core/culling/box_tree.h"
 #include "core/raster/rasterise.h"
 
 namespace scarp {
@@ -13,33 +14,6 @@ namespace {
 /// are drawn up to half a subpixel of the finest picture aside.
 constexpr double kBoxMarginPx = kEdgeMarginPx;
 constexpr double kBoxDepthMargin = 0x1p-18;  // relative
-
-double square_distance_m2(const Position& eye, const Box& box) {
-  const auto outside = [](double at, double low, double high) {
-    return std::max({low - at, 0.0, at - high});
-  };
-  const double x = outside(eye.x_m, box.low.x_m, box.high.x_m);
-  const double y = outside(eye.y_m, box.low.y_m, box.high.y_m);
-  const double z = outside(eye.z_m, box.low.z_m, box.high.z_m);
-  return x * x + y * y + z * z;
-}
-
-/// Whether a box is in the picture of a pyramid, and covered there.
-bool is_covered(const CoveragePyramid& pyramid, const Projection& projection, const Box& box,
-                float opacity) {
-  ScreenBox on_screen;
-  if (!place_on_screen(projection, box, pyramid.width_px(), pyramid.height_px(), on_screen))
-    return false;
-  const auto pixel = [](double px, int size) {
-    return static_cast<int>(std::clamp(std::floor(px), 0.0, static_cast<double>(size - 1)));
-  };
-  const PixelBox pixels{pixel(on_screen.left - kBoxMarginPx, pyramid.width_px()),
-                        pixel(on_screen.top - kBoxMarginPx, pyramid.height_px()),
-                        pixel(on_screen.right + kBoxMarginPx, pyramid.width_px()),
-                        pixel(on_screen.bottom + kBoxMarginPx, pyramid.height_px())};
-  const auto nearest = static_cast<float>(on_screen.nearest * (1 + kBoxDepthMargin));
-  return pyramid.covers(pixels, nearest, opacity);
-}
 
 int height_for(const Shot& shot, int width_px) {
   return std::max(1, width_px * shot.height_px / shot.width_px);
@@ -60,6 +34,22 @@ CullingAnswer test_all(const GroupBatches& batches, std::span<const GroupIndex> 
 }
 
 }  // namespace
+
+bool is_covered(const CoveragePyramid& pyramid, const Projection& projection, const Box& box,
+                float opacity) {
+  ScreenBox on_screen;
+  if (!place_on_screen(projection, box, pyramid.width_px(), pyramid.height_px(), on_screen))
+    return false;
+  const auto pixel = [](double px, int size) {
+    return static_cast<int>(std::clamp(std::floor(px), 0.0, static_cast<double>(size - 1)));
+  };
+  const PixelBox pixels{pixel(on_screen.left - kBoxMarginPx, pyramid.width_px()),
+                        pixel(on_screen.top - kBoxMarginPx, pyramid.height_px()),
+                        pixel(on_screen.right + kBoxMarginPx, pyramid.width_px()),
+                        pixel(on_screen.bottom + kBoxMarginPx, pyramid.height_px())};
+  const auto nearest = static_cast<float>(on_screen.nearest * (1 + kBoxDepthMargin));
+  return pyramid.covers(pixels, nearest, opacity);
+}
 
 void NearGroups::find(const GroupBatches& batches, const Frustum& frustum, const Position& eye,
                       std::uint32_t occluder_triangles) {

@@ -16,6 +16,11 @@ struct ImageCullingOptions {
   float opacity = 1;  ///< hom: the covered share of a texel from which it hides
 };
 
+/// Whether a box is beyond the near plane and covered in the picture of a pyramid.
+/// Side: with opacity 1 and a conservative map, what the box holds is hidden in every picture.
+bool is_covered(const CoveragePyramid& pyramid, const Projection& projection, const Box& box,
+                float opacity);
+
 /// The groups of a picture, nearest boxes first, and those of them that are drawn to hide others.
 class NearGroups {
  public:

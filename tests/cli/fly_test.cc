@@ -65,8 +65,8 @@ TEST_F(FlyCommand, MethodsThatClaimItShowNoWrongPixelAndLeaveSomethingOut) {
       EXPECT_EQ(method["wrong_px"], json::array({0, 0})) << name;
       EXPECT_EQ(method["missed_groups"], 0) << name;
     }
-    EXPECT_EQ(methods,
-              (std::set<std::string>{"frustum", "thesis", "certified", "hzb", "hom", "hom-0.7"}));
+    EXPECT_EQ(methods, (std::set<std::string>{"frustum", "thesis", "certified", "hzb", "mask",
+                                              "hom", "hom-0.7"}));
   }
 }
 
@@ -115,11 +115,13 @@ TEST_F(FlyCommand, ReplacesAnEarlierFlightAndNothingElse) {
                           " --frames 2 --width 64 --methods frustum --overwrite";
   ASSERT_EQ(run_scarp(fly).exit_code, 0);
   EXPECT_EQ(run_scarp(fly).exit_code, 0);
-  std::ofstream(out + "/thesis.txt") << "years of work";
-  const RunResult run = run_scarp(fly);
+  const std::string work = folder_->path("work");
+  std::filesystem::create_directory(work);
+  std::ofstream(work + "/thesis.txt") << "years of work";
+  const RunResult run = run_scarp("$SCARP fly " + scene_ + " -o " + work + " --overwrite");
   EXPECT_EQ(run.exit_code, 1);
-  EXPECT_NE(run.errors.find("thesis.txt"), std::string::npos) << run.errors;
-  EXPECT_EQ(read_text(out + "/thesis.txt"), "years of work");
+  EXPECT_NE(run.errors.find("earlier results"), std::string::npos) << run.errors;
+  EXPECT_EQ(read_text(work + "/thesis.txt"), "years of work");
 }
 
 }  // namespace

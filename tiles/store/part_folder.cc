@@ -11,7 +11,7 @@
 namespace scarp {
 namespace fs = std::filesystem;
 
-PartFolder::PartFolder(std::string path, Existing existing)
+PartFolder::PartFolder(std::string path, const std::string& mark, Existing existing)
     : path_(std::move(path)), existing_(existing) {
   while (path_.size() > 1 && path_.back() == '/') path_.pop_back();
   if (fs::exists(fs::symlink_status(path_))) {
@@ -20,11 +20,12 @@ PartFolder::PartFolder(std::string path, Existing existing)
                   fmt::format("'{}': exists; a new folder was expected; choose another name, or "
                               "give --overwrite",
                               path_));
-    if (!fs::is_directory(fs::symlink_status(path_)))
+    if (!fs::is_directory(fs::symlink_status(path_)) ||
+        !(fs::is_empty(path_) || fs::exists(path_ + "/" + mark)))
       throw Error(ErrorCode::kInput,
-                  fmt::format("'{}': no folder; a folder to replace was expected; choose another "
-                              "name",
-                              path_));
+                  fmt::format("'{}': not a folder of earlier results, which would hold {}; choose "
+                              "another name",
+                              path_, mark));
   }
   part_path_ = path_ + ".part-" + unique_suffix();
   std::error_code failure;
@@ -44,21 +45,10 @@ void PartFolder::write(const std::string& name, std::span<const std::byte> bytes
   write_file(path_for(name), bytes, Existing::kRefuse);
 }
 
-/// What would be lost is told by name: anything that this run has not written itself.
-void PartFolder::check_replaceable() const {
-  for (const auto& entry : fs::directory_iterator(path_))
-    if (!fs::exists(path_for(entry.path().filename().string())))
-      throw Error(ErrorCode::kInput,
-                  fmt::format("'{}': holds '{}', which is not of this output; a folder of earlier "
-                              "results was expected; choose another name",
-                              path_, entry.path().filename().string()));
-}
-
 void PartFolder::commit() {
   flush_folder(part_path_);
   std::string old;
   if (existing_ == Existing::kReplace && fs::is_directory(path_)) {
-    check_replaceable();
     old = replace_folder(part_path_, path_);
   } else if (const int failure = rename_to_new(part_path_, path_)) {
     throw Error(failure == EEXIST ? ErrorCode::kInput : ErrorCode::kResource,

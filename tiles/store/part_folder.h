@@ -11,12 +11,12 @@ namespace scarp {
 /// A folder of results that appears under its name whole or not at all. It grows as
 /// "<path>.part-<pid>-<random>"; without commit(), whatever the reason, it is removed.
 ///
-/// Existing::kReplace replaces a folder that holds nothing but files of the names that are written,
-/// so that a mistyped name loses nobody's work.
+/// Existing::kReplace replaces an empty folder, or one that holds a file named `mark`, by which
+/// earlier results are known: a mistyped name loses nobody's work.
 /// Errors, of all members: kInput where the output may not be replaced, kResource from the disk.
 class PartFolder {
  public:
-  PartFolder(std::string path, Existing existing);
+  PartFolder(std::string path, const std::string& mark, Existing existing);
   ~PartFolder();
   PartFolder(const PartFolder&) = delete;
   PartFolder& operator=(const PartFolder&) = delete;
@@ -33,8 +33,6 @@ class PartFolder {
   void commit();
 
  private:
-  void check_replaceable() const;
-
   std::string path_;
   std::string part_path_;
   Existing existing_;
