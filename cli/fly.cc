@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -16,6 +17,7 @@
 #include "core/culling/box_tree.h"
 #include "core/culling/image_culling.h"
 #include "core/culling/mask_culling.h"
+#include "core/culling/query_culling.h"
 #include "core/error/error.h"
 #include "tiles/layers/png_image.h"
 #include "tiles/store/part_folder.h"
@@ -37,10 +39,33 @@ class EverythingInView : public CullingMethod {
 };
 
 constexpr char kPageName[] = "flight.html";
+/// Of the triangles, in the two levels that objects are counted with.
+constexpr double kCoarseShares[] = {0.25, 0.0625};
+
 constexpr float kSmallGapOpacity = 0.7F;
 
-std::vector<Contender> contenders_of(const LoadedScene& scene, const GroupBatches& batches,
-                                     const BoxTree& tree, const std::vector<std::string>& wanted) {
+/// What methods are made from; some of them share it.
+struct Prepared {
+  GroupBatches batches;
+  BoxTree tree;
+  double coarse_s = 0;
+  CoarseBatches coarse;
+
+  explicit Prepared(const LoadedScene& scene)
+      : batches(scene.tin, scene.groups), tree(batches), coarse(timed_coarse()) {}
+
+ private:
+  CoarseBatches timed_coarse() {
+    const auto begun = std::chrono::steady_clock::now();
+    CoarseBatches made(batches, {std::begin(kCoarseShares), std::end(kCoarseShares)});
+    coarse_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+    return made;
+  }
+};
+
+std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& prepared,
+                                     const std::vector<std::string>& wanted) {
+  const GroupBatches& batches = prepared.batches;
   std::vector<Contender> all;
   const auto add = [&](const std::string& label, bool is_conservative, double prepare_s,
                        std::uint64_t bytes, auto make) {
@@ -56,11 +81,17 @@ std::vector<Contender> contenders_of(const LoadedScene& scene, const GroupBatche
           [&] { return culling_method(scene, method); });
   }
   add("hzb", true, 0, 0, [&] { return std::make_unique<HzbCulling>(scene.tin, batches); });
-  add("mask", false, 0, 0, [&] { return std::make_unique<MaskCulling>(scene.tin, batches, tree); });
+  add("mask", false, 0, 0,
+      [&] { return std::make_unique<MaskCulling>(scene.tin, batches, prepared.tree); });
   ImageCullingOptions hom;
   add("hom", false, 0, 0, [&] { return std::make_unique<HomCulling>(batches, hom); });
   hom.opacity = kSmallGapOpacity;
   add("hom-0.7", false, 0, 0, [&] { return std::make_unique<HomCulling>(batches, hom); });
+  for (const QueryUse use : {QueryUse::kSameFrame, QueryUse::kNextFrame})
+    add(use == QueryUse::kSameFrame ? "lod-query" : "multi-frame", false, prepared.coarse_s,
+        prepared.coarse.bytes(),
+        [&] { return std::make_unique<QueryCulling>(batches, prepared.coarse, use); });
+  add("stop-and-wait", false, 0, 0, [&] { return std::make_unique<StopAndWaitCulling>(batches); });
   for (const std::string& name : wanted)
     if (std::none_of(all.begin(), all.end(), [&](const Contender& c) { return c.label == name; }))
       throw Error(ErrorCode::kInput,
@@ -128,9 +159,8 @@ int run_fly(const FlyOptions& options) {
       options.path_file.empty()
           ? find_path(scene, route_of(options.route), options.frames, options.seed)
           : read_path(options.path_file);
-  const GroupBatches batches(scene.tin, scene.groups);
-  const BoxTree tree(batches);
-  std::vector<Contender> contenders = contenders_of(scene, batches, tree, options.methods);
+  const Prepared prepared(scene);
+  std::vector<Contender> contenders = contenders_of(scene, prepared, options.methods);
 
   Lens lens;
   lens.width_px = options.width_px;
@@ -143,7 +173,7 @@ int run_fly(const FlyOptions& options) {
   std::vector<std::pair<std::string, std::string>> pictures;
   ProgressBar bar(!options.common.json);
   const Flight flight = fly(
-      batches, shots, contenders,
+      prepared.batches, shots, contenders,
       [&](std::size_t frame, std::size_t contender, const Target& whole, const Target& drawn) {
         if (!is_pictured(frame, shots.size(), options.pictures)) return;
         const Picture picture = frame_picture(scene.tin, scene.groups, whole, drawn);
