@@ -15,6 +15,7 @@
 #include "cli/progress_bar.h"
 #include "cli/scene_culling.h"
 #include "core/culling/box_tree.h"
+#include "core/culling/cell_culling.h"
 #include "core/culling/image_culling.h"
 #include "core/culling/mask_culling.h"
 #include "core/culling/query_culling.h"
@@ -63,6 +64,21 @@ struct Prepared {
   }
 };
 
+/// Where cells are made: the ground and what is above it, as far as the highest is above the
+/// lowest.
+Bounds airspace(const Tin& tin) {
+  Bounds space = bounds_of(tin.vertices);
+  space.high.z_m += std::max(1.0, space.high.z_m - space.low.z_m);
+  return space;
+}
+
+/// Cells are divided down to a quarter of the mean group's radius.
+double least_cell_m(const CertifiedRegions& regions) {
+  double sum_m = 0;
+  for (const CertifiedGroup& group : regions.groups) sum_m += static_cast<double>(group.radius_m);
+  return sum_m / static_cast<double>(regions.groups.size()) / 4;
+}
+
 std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& prepared,
                                      const std::vector<std::string>& wanted) {
   const GroupBatches& batches = prepared.batches;
@@ -83,6 +99,11 @@ std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& p
   add("hzb", true, 0, 0, [&] { return std::make_unique<HzbCulling>(scene.tin, batches); });
   add("mask", false, 0, 0,
       [&] { return std::make_unique<MaskCulling>(scene.tin, batches, prepared.tree); });
+  if (scene.groups.has_certified())
+    add("cells", true, 0, 0, [&] {
+      return std::make_unique<CellCulling>(scene.groups.certified, airspace(scene.tin),
+                                           least_cell_m(scene.groups.certified));
+    });
   ImageCullingOptions hom;
   add("hom", false, 0, 0, [&] { return std::make_unique<HomCulling>(batches, hom); });
   hom.opacity = kSmallGapOpacity;

@@ -15,7 +15,7 @@ std::uint32_t BoxTree::split(const GroupBatches& batches, std::uint32_t first,
   const auto index = static_cast<std::uint32_t>(nodes_.size());
   Node node{batches.box(groups_[first]), first, count, 0, kNone, kNone};
   for (std::uint32_t i = first; i < first + count; ++i) {
-    const Box& box = batches.box(groups_[i]);
+    const Bounds& box = batches.box(groups_[i]);
     for (double Position::*c : {&Position::x_m, &Position::y_m, &Position::z_m}) {
       node.box.low.*c = std::min(node.box.low.*c, box.low.*c);
       node.box.high.*c = std::max(node.box.high.*c, box.high.*c);
@@ -41,7 +41,7 @@ std::uint32_t BoxTree::split(const GroupBatches& batches, std::uint32_t first,
   return index;
 }
 
-double square_distance_m2(const Position& eye, const Box& box) {
+double square_distance_m2(const Position& eye, const Bounds& box) {
   const auto outside = [](double at, double low, double high) {
     return std::max({low - at, 0.0, at - high});
   };

@@ -13,7 +13,7 @@ namespace scarp {
 class BoxTree {
  public:
   struct Node {
-    Box box;
+    Bounds box;
     std::uint32_t first, count;  // of groups()
     std::uint32_t triangles;     // of all of them
     std::uint32_t left, right;   // children, kNone in a leaf
@@ -37,6 +37,6 @@ class BoxTree {
 };
 
 /// Square of the distance from a place to a box, 0 within it.
-double square_distance_m2(const Position& eye, const Box& box);
+double square_distance_m2(const Position& eye, const Bounds& box);
 
 }  // namespace scarp

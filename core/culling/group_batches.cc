@@ -6,7 +6,7 @@
 namespace scarp {
 namespace {
 
-std::array<Position, 8> corners_of(const Box& box) {
+std::array<Position, 8> corners_of(const Bounds& box) {
   std::array<Position, 8> corners;
   for (std::size_t i = 0; i < 8; ++i)
     corners[i] = {(i & 1) != 0 ? box.high.x_m : box.low.x_m,
@@ -70,7 +70,7 @@ void GroupBatches::add_to(GroupIndex group, Drawing& drawing) const {
   }
 }
 
-bool Frustum::may_show(const Box& box) const {
+bool Frustum::may_show(const Bounds& box) const {
   // A box is beside the picture when all its corners are beyond one of its planes.
   std::uint32_t outside = 0x3f;
   for (const Position& corner : corners_of(box)) {
@@ -87,7 +87,7 @@ bool Frustum::may_show(const Box& box) const {
   return outside == 0;
 }
 
-bool place_on_screen(const Projection& projection, const Box& box, int width_px, int height_px,
+bool place_on_screen(const Projection& projection, const Bounds& box, int width_px, int height_px,
                      ScreenBox& on_screen) {
   on_screen = {HUGE_VAL, HUGE_VAL, -HUGE_VAL, -HUGE_VAL, 0};
   for (const Position& corner : corners_of(box)) {

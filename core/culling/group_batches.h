@@ -11,11 +11,6 @@
 
 namespace scarp {
 
-/// An upright box, metres.
-struct Box {
-  Position low, high;
-};
-
 /// The triangles of a scene as they are drawn: a batch a group, and a last one of the orphans.
 /// Each has vertices of its own, side by side, as a graphics card would be given them.
 class GroupBatches {
@@ -23,7 +18,7 @@ class GroupBatches {
   GroupBatches(const Tin& tin, const Groups& groups);
 
   std::uint32_t groups() const { return static_cast<std::uint32_t>(boxes_.size()); }
-  const Box& box(GroupIndex group) const { return boxes_[group]; }
+  const Bounds& box(GroupIndex group) const { return boxes_[group]; }
 
   /// Triangles of a group, by their numbers in the TIN; of the orphans for group == groups().
   std::span<const TriangleIndex> triangles(GroupIndex group) const {
@@ -42,7 +37,7 @@ class GroupBatches {
   void add_to(GroupIndex group, Drawing& drawing) const;
 
  private:
-  std::vector<Box> boxes_;                           // [groups]
+  std::vector<Bounds> boxes_;                        // [groups]
   std::vector<std::uint32_t> first_triangle_;        // [groups + 2]
   std::vector<TriangleIndex> triangles_;             // by group
   std::vector<std::uint32_t> first_vertex_;          // [groups + 2]
@@ -56,7 +51,7 @@ class Frustum {
   Frustum(const Projection& projection) : projection_(projection) {}
 
   /// Whether a box may be in the picture. Side: never false for one that is.
-  bool may_show(const Box& box) const;
+  bool may_show(const Bounds& box) const;
 
   const Projection& projection() const { return projection_; }
 
@@ -72,7 +67,7 @@ struct ScreenBox {
 
 /// Side: never smaller or farther than the box is, but for rounding.
 /// @return whether the box lies beyond the near plane; otherwise nothing is said
-bool place_on_screen(const Projection& projection, const Box& box, int width_px, int height_px,
+bool place_on_screen(const Projection& projection, const Bounds& box, int width_px, int height_px,
                      ScreenBox& on_screen);
 
 }  // namespace scarp

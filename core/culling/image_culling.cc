@@ -35,7 +35,7 @@ CullingAnswer test_all(const GroupBatches& batches, std::span<const GroupIndex> 
 
 }  // namespace
 
-bool is_covered(const CoveragePyramid& pyramid, const Projection& projection, const Box& box,
+bool is_covered(const CoveragePyramid& pyramid, const Projection& projection, const Bounds& box,
                 float opacity) {
   ScreenBox on_screen;
   if (!place_on_screen(projection, box, pyramid.width_px(), pyramid.height_px(), on_screen))

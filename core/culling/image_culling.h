@@ -18,7 +18,7 @@ struct ImageCullingOptions {
 
 /// Whether a box is beyond the near plane and covered in the picture of a pyramid.
 /// Side: with opacity 1 and a conservative map, what the box holds is hidden in every picture.
-bool is_covered(const CoveragePyramid& pyramid, const Projection& projection, const Box& box,
+bool is_covered(const CoveragePyramid& pyramid, const Projection& projection, const Bounds& box,
                 float opacity);
 
 /// The groups of a picture, nearest boxes first, and those of them that are drawn to hide others.

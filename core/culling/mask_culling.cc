@@ -36,7 +36,7 @@ class CellCoverage {
   explicit CellCoverage(const Projection& projection) : projection_(projection) {}
 
   /// The least coverage of three cells: of the box's middle and the ends of a diagonal.
-  double least(const Box& box) const {
+  double least(const Bounds& box) const {
     const Position middle{(box.low.x_m + box.high.x_m) / 2, (box.low.y_m + box.high.y_m) / 2,
                           (box.low.z_m + box.high.z_m) / 2};
     double least = HUGE_VAL;
@@ -45,7 +45,7 @@ class CellCoverage {
     return least == HUGE_VAL ? 1 : least;
   }
 
-  void cover(const Box& box, std::uint32_t triangles) {
+  void cover(const Bounds& box, std::uint32_t triangles) {
     ScreenBox at;
     if (!place_on_screen(projection_, box, kColumns, kRows, at)) return;
     const auto clamped = [](double px, int size) {

@@ -17,7 +17,7 @@ Target small_target(const Shot& shot, int width_px, bool with_objects) {
 }
 
 /// Pixels of a box's rectangle that nothing hides from its nearest depth.
-std::uint32_t shown_pixels(const Target& target, const Projection& projection, const Box& box) {
+std::uint32_t shown_pixels(const Target& target, const Projection& projection, const Bounds& box) {
   constexpr std::uint32_t kMany = 1U << 30;
   ScreenBox at;
   if (!place_on_screen(projection, box, target.width_px, target.height_px, at)) return kMany;
@@ -48,7 +48,7 @@ void QueryCulling::count_pixels(const Camera& camera, std::span<const GroupIndex
   const Shot& shot = *camera.shot;
   drawing_ = {};
   for (const GroupIndex g : groups) {
-    const Box& box = batches_.box(g);
+    const Bounds& box = batches_.box(g);
     const double distance_m = std::sqrt(square_distance_m2(camera.eye, box));
     const double size_m = std::sqrt(square_distance_m2(box.low, {box.high, box.high}));
     if (distance_m < options_.near_sizes * size_m) {

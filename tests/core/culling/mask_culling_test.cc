@@ -200,7 +200,7 @@ TEST(BoxTree, HoldsEveryGroupOnceInBoxesThatHoldItsChildren) {
   const GroupBatches batches(scene.tin, scene.groups);
   const BoxTree tree(batches);
   std::vector<int> found(batches.groups(), 0);
-  const auto holds = [](const Box& outer, const Box& inner) {
+  const auto holds = [](const Bounds& outer, const Bounds& inner) {
     return outer.low.x_m <= inner.low.x_m && outer.high.x_m >= inner.high.x_m &&
            outer.low.y_m <= inner.low.y_m && outer.high.y_m >= inner.high.y_m &&
            outer.low.z_m <= inner.low.z_m && outer.high.z_m >= inner.high.z_m;
