@@ -42,6 +42,7 @@ class ViewSource {
   std::optional<LoadedScene> scene_;
   Ground ground_;
   std::optional<GroundGrid> obstacles_;
+  std::optional<GroundTops> tops_;  // of a DEM
 };
 
 }  // namespace scarp

@@ -481,14 +481,10 @@ class ViewshedRun {
       result["seen_samples"] = std::count_if(counts.begin(), counts.end(),
                                              [&](std::uint32_t n) { return n > 0 && !is_void(n); });
     } else {
-      const std::span<const Seen> sight = seen();
-      const auto samples_with = [&](Seen value) {
-        return std::count(sight.begin(), sight.end(), value);
-      };
-      result["visible_samples"] = samples_with(Seen::kVisible);
-      result["unknown_samples"] = samples_with(Seen::kUnknown);
-      result["hidden_samples"] = sight.size() - result["visible_samples"].get<std::size_t>() -
-                                 result["unknown_samples"].get<std::size_t>();
+      const SeenTotals totals = count_seen(seen());
+      result["visible_samples"] = totals.visible;
+      result["hidden_samples"] = totals.hidden;
+      result["unknown_samples"] = totals.unknown;
     }
     return result;
   }

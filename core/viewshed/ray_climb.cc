@@ -33,6 +33,12 @@ std::int32_t RayClimb::last_before(std::int32_t line, Seen2d& before, Seen2d& af
   const double guess = std::floor(eye_sample_ + (line - eye_line_) * samples_per_line_);
   auto i = static_cast<std::int32_t>(std::clamp(guess, 0.0, samples_ - 1.0));
   before = look(line, i);
+  // Where lines bend, the first look tells how many samples the guess was off.
+  const double off = std::floor(-before.beside / forwards_);
+  if (std::abs(off) > 1) {
+    i = static_cast<std::int32_t>(std::clamp(i + off, 0.0, samples_ - 1.0));
+    before = look(line, i);
+  }
   if (before.beside > 0) {
     do {
       after = before;

@@ -41,9 +41,18 @@ struct ViewGround {
     return ground;
   }
 
+  /// Of grids: what a sweep takes.
+  SweptGround swept() const {
+    SweptGround swept(obstacles ? *obstacles : stands, stands);
+    swept.tops = tops;
+    return swept;
+  }
+
   const GroundGrid& stands;
   const GroundGrid* obstacles = nullptr;
   const TinIndex* tin = nullptr;
+  /// Of what swept() has, for many eyes: measured once. Null: measured by each.
+  const GroundTops* tops = nullptr;
 };
 
 /// What one eye sees within its limits, exactly what GridSight or line_of_sight judges.
@@ -62,6 +71,12 @@ SampleWindow view_from(const ViewGround& ground, const std::optional<EarthFrame>
 SampleWindow heights_from(const ViewGround& ground, const std::optional<EarthFrame>& earth,
                           const ViewshedEye& eye, std::span<float> least_m,
                           SweepCounts* counts = nullptr);
+
+/// How many samples an eye has how.
+struct SeenTotals {
+  std::uint64_t visible = 0, hidden = 0, unknown = 0;
+};
+SeenTotals count_seen(std::span<const Seen> sight);
 
 /// Seen by any of the eyes so far: visible where one sees it, otherwise unknown where that
 /// holds for one.
@@ -106,6 +121,7 @@ class LeastHeight {
  private:
   std::size_t columns_;
   std::vector<float> least_m_;
+  LeastTops tops_;
 };
 
 }  // namespace scarp

@@ -210,6 +210,17 @@ bool convert_to_metres(std::size_t count, const std::uint8_t* __restrict known, 
   return true;
 }
 
+/// Is any value within reach of another, or no number?
+template <typename Value>
+bool any_near(std::size_t count, const Value* values, double to, double reach) {
+  std::int32_t any = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double off = std::abs(static_cast<double>(values[i]) - to);
+    any |= off > reach ? 0 : 1;
+  }
+  return any != 0;
+}
+
 /// Reads one file into its place; heights leave here in metres.
 class HeightReader {
  public:
@@ -266,43 +277,78 @@ class HeightReader {
   /// Heights in metres, row by row: put(row from the north, heights, known).
   template <typename Put>
   void read_rows_to(int first_row, int end_row, const Put& put) {
+    if (source_.band->GetRasterDataType() == GDT_Float32)
+      read_rows_as<float>(first_row, end_row, put);
+    else
+      read_rows_as<double>(first_row, end_row, put);
+  }
+
+ private:
+  /// @tparam Value  that holds all values of the file
+  template <typename Value, typename Put>
+  void read_rows_as(int first_row, int end_row, const Put& put) {
     const auto width = static_cast<std::size_t>(source_.columns);
-    std::vector<double> values(width * kRowsPerRead);
+    std::vector<Value> values(width * kRowsPerRead);
     std::vector<std::uint8_t> mask(width * kRowsPerRead, 255);
+    std::vector<double> of_row(width);
     for (int row = first_row; row < end_row; row += kRowsPerRead) {
       const int count = std::min(kRowsPerRead, end_row - row);
       read_rows(row, count, values, mask);
       for (int r = 0; r < count; ++r) {
-        const std::span<double> heights_m(&values[static_cast<std::size_t>(r) * width], width);
+        const Value* from = &values[static_cast<std::size_t>(r) * width];
+        std::copy(from, from + width, of_row.begin());
         std::uint8_t* known = &mask[static_cast<std::size_t>(r) * width];
         if (options_.nodata)
           for (std::size_t c = 0; c < width; ++c)
-            if (heights_m[c] == *options_.nodata) known[c] = 0;
-        if (!convert(heights_m, known))
+            if (of_row[c] == *options_.nodata) known[c] = 0;
+        if (!convert(of_row, known))
           for (std::size_t c = 0; c < width; ++c)
-            if (known[c]) metres(heights_m[c], c, row + r);  // refuses the first that is wrong
-        put(source_.south_up ? source_.rows - 1 - (row + r) : row + r, heights_m, known);
-        if (!has_mask_) std::fill(known, known + width, std::uint8_t{255});
+            if (known[c]) metres(of_row[c], c, row + r);  // refuses the first that is wrong
+        put(source_.south_up ? source_.rows - 1 - (row + r) : row + r, std::span<double>(of_row),
+            known);
+        if (options_.nodata) std::fill(known, known + width, std::uint8_t{255});
       }
     }
   }
 
- private:
-  void read_rows(int row, int count, std::vector<double>& values, std::vector<std::uint8_t>& mask) {
+  template <typename Value>
+  void read_rows(int row, int count, std::vector<Value>& values, std::vector<std::uint8_t>& mask) {
     CPLPushErrorHandler(CPLQuietErrorHandler);
     CPLErrorReset();
+    constexpr GDALDataType kType = sizeof(Value) == sizeof(float) ? GDT_Float32 : GDT_Float64;
     CPLErr result = source_.band->RasterIO(GF_Read, 0, row, source_.columns, count, values.data(),
-                                           source_.columns, count, GDT_Float64, 0, 0);
-    if (result == CE_None && has_mask_)
-      result = source_.band->GetMaskBand()->RasterIO(GF_Read, 0, row, source_.columns, count,
-                                                     mask.data(), source_.columns, count, GDT_Byte,
-                                                     0, 0);
+                                           source_.columns, count, kType, 0, 0);
+    const auto size = static_cast<std::size_t>(source_.columns) * static_cast<std::size_t>(count);
+    if (result == CE_None && has_mask_) {
+      if (may_be_void(std::span<const Value>(values.data(), size)))
+        result = source_.band->GetMaskBand()->RasterIO(GF_Read, 0, row, source_.columns, count,
+                                                       mask.data(), source_.columns, count,
+                                                       GDT_Byte, 0, 0);
+      else
+        std::fill_n(mask.begin(), size, std::uint8_t{255});
+    }
     const std::string reason = CPLGetLastErrorMsg();
     CPLPopErrorHandler();
     if (result != CE_None)
-      refuse(source_.file, fmt::format("cannot be read at row {} of {} ({}); the whole raster was "
-                                       "expected; is the file complete?",
-                                       row, source_.rows, reason));
+      refuse(source_.file,
+             fmt::format("cannot be read at row {} of {} ({}); the whole raster was "
+                         "expected; is the file complete?",
+                         row, source_.rows, reason.empty() ? "too few bytes" : reason));
+  }
+
+  /// Can the mask differ from "all known"? Where it stands for a nodata value only, it is as costly
+  /// as the heights, and mostly nothing is near that value.
+  template <typename Value>
+  bool may_be_void(std::span<const Value> values) const {
+    const GDALDataType type = source_.band->GetRasterDataType();
+    if (source_.band->GetMaskFlags() != GMF_NODATA || type == GDT_Int64 || type == GDT_UInt64)
+      return true;
+    const double nodata = source_.band->GetNoDataValue();
+    // GDAL takes values for equal that differ in their last bits.
+    constexpr double kNearly = 1e-4;
+    return std::isnan(nodata)
+               ? any_near(values.size(), values.data(), 0.0, -1.0)
+               : any_near(values.size(), values.data(), nodata, kNearly * std::abs(nodata));
   }
 
   /// Known values to metres, all of a row; where one is no height, nothing is done.

@@ -146,7 +146,10 @@ void write_geotiff_cog(const std::string& path, const RasterLayer& layer, Existi
   session.check(path);
   CPLStringList options;
   options.SetNameValue("COMPRESS", layer.is_bulky ? "NONE" : "DEFLATE");
-  if (!layer.is_bulky) options.SetNameValue("PREDICTOR", data.predictor);
+  if (!layer.is_bulky) {
+    options.SetNameValue("PREDICTOR", data.predictor);
+    options.SetNameValue("LEVEL", "1");  // the most of what can be had, at a third of the time
+  }
   options.SetNameValue("BIGTIFF", "IF_SAFER");
   options.SetNameValue("NUM_THREADS", std::to_string(thread_count()).c_str());
   options.SetNameValue("OVERVIEW_RESAMPLING", data.is_float ? "AVERAGE" : "NEAREST");

@@ -130,6 +130,31 @@ TEST(SweepViewshed, EqualsTheJudgeOnEveryCell) {
   }
 }
 
+/// Large enough for many tiles to be passed over, with voids, raised targets and eyes far outside.
+TEST(SweepViewshed, PassesOverNothingThatIsSeen) {
+  SweepCounts all;
+  std::uint64_t samples = 0;
+  for (const double bend : {0.0, 2.0}) {
+    for (const double void_share : {0.0, 0.0003}) {
+      for (const Relief relief : {Relief::kSmooth, Relief::kRough}) {
+        const GroundGrid grid = random_ground({relief, 190, 170, bend, void_share, 5});
+        std::mt19937 random(11);
+        for (const Position& eye : eyes_for(grid, random, 2)) {
+          const double target_m = relief == Relief::kSmooth ? 3 : 0;
+          SweepCounts counts;
+          const auto expected = judged(grid, eye, target_m);
+          ASSERT_EQ(swept(grid, eye, target_m, &counts), expected)
+              << "bend " << bend << " void " << void_share << " eye " << eye.x_m << ' ' << eye.y_m
+              << ' ' << eye.z_m;
+          all.add(counts);
+          samples += expected.size();
+        }
+      }
+    }
+  }
+  EXPECT_LT(all.targets, samples * 3 / 4);
+}
+
 /// A target at the least height is seen, and one two millimetres lower is not.
 TEST(SweepHeights, AreTheLeastAtWhichATargetIsSeen) {
   for (const GroundRecipe& recipe : recipes()) {
@@ -229,9 +254,10 @@ TEST(SweepViewshed, DecidesMostByItsBounds) {
     eye.z_m += 2;
     SweepCounts counts;
     swept(grid, eye, 0, &counts);
-    EXPECT_EQ(counts.targets, 300U * 280U);
+    // The others lie in tiles that are hidden as a whole.
+    EXPECT_LT(counts.targets, 300U * 280U / 3);
     EXPECT_LT(counts.traced_whole, 100U);
-    EXPECT_LT(counts.traced_part, counts.targets / 10);
+    EXPECT_LT(counts.traced_part, counts.targets / 5);
   }
 }
 
