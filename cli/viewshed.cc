@@ -12,6 +12,7 @@
 
 #include "cli/build/layers.h"
 #include "cli/commands.h"
+#include "cli/scratch_memory.h"
 #include "cli/stages.h"
 #include "cli/view_source.h"
 #include "core/error/error.h"
@@ -191,6 +192,9 @@ class ViewshedRun {
     DemOptions dem = options_.dem;
     dem.memory_budget_bytes = options_.common.memory_budget_bytes;
     dem.more_bytes_per_sample = more_bytes_per_sample(options_);
+    dem.make_room = [&](double samples, double reading_bytes) {
+      return make_room(samples, reading_bytes);
+    };
     source_.emplace(options_.sources, options_.obstacles, dem, progress);
     for (const TypedPosition& typed : options_.observers)
       eyes_.push_back({source_->place(typed, options_.crs), options_.target_height_m,
@@ -203,6 +207,21 @@ class ViewshedRun {
       eyes_.push_back(eye_of(record, options_, *source_));
   }
 
+  /// Puts the large arrays on the disk where memory is tight but enough for blocks.
+  bool make_room(double samples, double reading_bytes) {
+    if (!options_.polygons.empty()) return false;  // outlines are traced in memory
+    // For each thread the history of a part, with room to spare; and what comes and goes, such as
+    // pages between two reliefs and blocks that are packed.
+    constexpr double kHistoryBytesPerSample = 0.15, kWorkBytes = 32e6;
+    const auto budget_bytes = static_cast<double>(options_.common.memory_budget_bytes);
+    const double work_bytes =
+        reading_bytes + kWorkBytes + thread_count() * kHistoryBytesPerSample * samples;
+    if (static_cast<double>(resident_now_bytes()) + work_bytes > budget_bytes) return false;
+    scratch_.emplace(folder_of(options_.output),
+                     static_cast<std::uint64_t>(budget_bytes - kWorkBytes));
+    return true;
+  }
+
   bool measures_heights() const {
     return options_.mode == ViewshedMode::kGround || options_.mode == ViewshedMode::kDem;
   }
@@ -213,7 +232,7 @@ class ViewshedRun {
         static_cast<std::size_t>(grid.columns()) * static_cast<std::size_t>(grid.rows());
     if (measures_heights()) {
       least_.emplace(grid);
-      if (!options_.each_folder.empty()) eye_heights_m_.resize(samples);
+      if (!options_.each_folder.empty()) eye_heights_m_ = LargeArray<float>(samples);
     } else {
       sight_ = LargeArray<Seen>(samples);
     }
@@ -233,10 +252,7 @@ class ViewshedRun {
   void see_back(const Progress& progress) {
     const GroundGrid& grid = source_->samples();
     const auto earth = source_->dem().frame->earth_frame();
-    std::uint64_t known = 0;
-    for (std::int32_t row = 0; row < grid.rows(); ++row)
-      for (std::int32_t column = 0; column < grid.columns(); ++column)
-        known += grid.is_known(column, row) ? 1 : 0;
+    const std::uint64_t known = count_known(grid);
     if (known == 0)
       throw Error(ErrorCode::kInput, fmt::format("'{}': no sample is known; ground was expected; "
                                                  "check --nodata and --obstacles",
@@ -259,12 +275,13 @@ class ViewshedRun {
       decided_.add(counts);
       if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(places.size()));
     }
+    sight_ = LargeArray<Seen>();
     areas_km2_ = seen.areas_km2(looks_share_);
   }
 
   void write_total() {
     RasterLayer layer =
-        layer_over(source_->dem(), std::span<const float>(areas_km2_), "ground seen");
+        layer_over(source_->dem(), std::span<const float>(areas_km2_.span()), "ground seen");
     layer.unit = "km2";
     layer.nodata = std::numeric_limits<double>::quiet_NaN();
     layer.metadata["VALUES"] = "ground that is seen from here, square kilometres; NaN void";
@@ -288,8 +305,8 @@ class ViewshedRun {
     if (least_ && options_.each_folder.empty()) {
       least_->lower(source_->ground(), earth, eye, &counts);
     } else if (least_) {
-      window_ = heights_from(source_->ground(), earth, eye, eye_heights_m_, &counts);
-      least_->add(window_, eye_heights_m_);
+      window_ = heights_from(source_->ground(), earth, eye, eye_heights_m_.span(), &counts);
+      least_->add(window_, eye_heights_m_.span());
     } else {
       window_ = view_from(source_->ground(), earth, eye, sight_.span(), &counts);
       if (count_) count_->add(window_, sight_.span());
@@ -311,7 +328,7 @@ class ViewshedRun {
     const std::string path = fmt::format("{}/{}.tif", options_.each_folder, name);
     if (least_) {
       LeastHeight alone(source_->samples());
-      alone.add(window_, eye_heights_m_);
+      alone.add(window_, eye_heights_m_.span());
       write_heights(path, alone.heights_m(), i, i + 1);
     } else {
       AnyEye alone(source_->samples());
@@ -357,6 +374,7 @@ class ViewshedRun {
   void write_layer(const std::string& path, RasterLayer& layer, std::size_t first,
                    std::size_t end) const {
     describe(layer.metadata, first, end);
+    layer.saves_memory = scratch_.has_value();
     write_geotiff_cog(path, layer, existing());
   }
 
@@ -367,11 +385,12 @@ class ViewshedRun {
                                               sight.size());
     RasterLayer layer;
     if (options_.gdal_values) {
-      gdal_values_.resize(bytes.size());
-      std::transform(sight.begin(), sight.end(), gdal_values_.begin(), [](Seen s) {
+      gdal_values_ = LargeArray<std::uint8_t>(bytes.size());
+      std::transform(sight.begin(), sight.end(), gdal_values_.span().begin(), [](Seen s) {
         return static_cast<std::uint8_t>(s == Seen::kVisible ? 255 : 0);
       });
-      layer = layer_over(source_->dem(), std::span<const std::uint8_t>(gdal_values_), "visible");
+      layer =
+          layer_over(source_->dem(), std::span<const std::uint8_t>(gdal_values_.span()), "visible");
       layer.metadata["VALUES"] = "255 visible, 0 hidden or unknown";
     } else {
       layer = layer_over(source_->dem(), bytes, "visible");
@@ -523,18 +542,19 @@ class ViewshedRun {
 
   const ViewshedOptions& options_;
   Stages stages_;
+  std::optional<ScratchMemory> scratch_;  // holds what follows, where it is used
   std::optional<ViewSource> source_;
   std::vector<RunEye> eyes_;
   LargeArray<Seen> sight_;
   std::optional<AnyEye> any_;
   std::optional<EyeCount> count_;
   std::optional<LeastHeight> least_;
-  std::vector<float> areas_km2_;  // of --total
+  LargeArray<float> areas_km2_;  // of --total
   std::size_t looks_ = 0;
   double looks_share_ = 1;  // of the known samples
-  std::vector<float> eye_heights_m_;
+  LargeArray<float> eye_heights_m_;
   SampleWindow window_;  // of the eye last seen from
-  std::vector<std::uint8_t> gdal_values_;
+  LargeArray<std::uint8_t> gdal_values_;
   SweepCounts decided_;
 };
 

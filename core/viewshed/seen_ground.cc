@@ -9,12 +9,17 @@
 
 namespace scarp {
 
-std::vector<SamplePlace> choose_samples(const GroundGrid& grid, std::uint64_t count,
-                                        std::uint64_t seed) {
-  std::uint64_t left = 0;
+std::uint64_t count_known(const GroundGrid& grid) {
+  std::uint64_t known = 0;
   for (std::int32_t row = 0; row < grid.rows(); ++row)
     for (std::int32_t column = 0; column < grid.columns(); ++column)
-      left += grid.is_known(column, row) ? 1 : 0;
+      known += grid.is_known(column, row) ? 1 : 0;
+  return known;
+}
+
+std::vector<SamplePlace> choose_samples(const GroundGrid& grid, std::uint64_t count,
+                                        std::uint64_t seed) {
+  std::uint64_t left = count_known(grid);
   std::uint64_t wanted = std::min(count, left);
   std::vector<SamplePlace> chosen;
   chosen.reserve(wanted);
@@ -52,12 +57,14 @@ double cell_area_m2(const GroundGrid& grid, const std::optional<EarthFrame>& ear
 
 SeenGround::SeenGround(const GroundGrid& grid)
     : columns_(static_cast<std::size_t>(grid.columns())),
-      area_m2_(columns_ * static_cast<std::size_t>(grid.rows()), 0) {
-  for (std::int32_t row = 0; row < grid.rows(); ++row)
-    for (std::int32_t column = 0; column < grid.columns(); ++column)
-      if (!grid.is_known(column, row))
-        area_m2_[static_cast<std::size_t>(row) * columns_ + static_cast<std::size_t>(column)] =
-            std::numeric_limits<double>::quiet_NaN();
+      area_m2_(columns_ * static_cast<std::size_t>(grid.rows())) {
+  parallel_for(static_cast<std::size_t>(grid.rows()), [&](std::size_t row) {
+    for (std::size_t column = 0; column < columns_; ++column)
+      area_m2_[row * columns_ + column] =
+          grid.is_known(static_cast<std::int32_t>(column), static_cast<std::int32_t>(row))
+              ? 0
+              : std::numeric_limits<double>::quiet_NaN();
+  });
 }
 
 void SeenGround::add(const SampleWindow& window, std::span<const Seen> sight, double area_m2) {
@@ -71,11 +78,13 @@ void SeenGround::add(const SampleWindow& window, std::span<const Seen> sight, do
       });
 }
 
-std::vector<float> SeenGround::areas_km2(double share) const {
-  std::vector<float> areas(area_m2_.size());
+LargeArray<float> SeenGround::areas_km2(double share) const {
+  LargeArray<float> areas(area_m2_.size());
   constexpr double kM2PerKm2 = 1e6;
-  std::transform(area_m2_.begin(), area_m2_.end(), areas.begin(),
-                 [&](double m2) { return static_cast<float>(m2 / share / kM2PerKm2); });
+  parallel_for(areas.size() / columns_, [&](std::size_t row) {
+    for (std::size_t i = row * columns_; i < (row + 1) * columns_; ++i)
+      areas[i] = static_cast<float>(area_m2_[i] / share / kM2PerKm2);
+  });
   return areas;
 }
 

@@ -60,14 +60,15 @@ float SweepRun::climb_in_bin(const Line& line, std::int32_t k, std::size_t bin, 
   float least_s = below(low_[bin]);
   double highest = -std::numeric_limits<double>::infinity();
   const auto climb_over = [&](std::int32_t across) {
+    std::optional<double> slope;
+    if (std::abs(across - eye_line_) > RayClimb::kLeastLines) slope = ray.slope_at(across);
     const double s =
-        std::abs(across - eye_line_) > RayClimb::kLeastLines
-            ? ray.slope_at(across)
-            : (sight_.least_z_between_m(stand(line.number, i), over_columns_ ? line.number : i,
-                                        over_columns_ ? i : line.number, over_columns_, across,
-                                        across - outwards_) -
-               eye_z_m) /
-                  forwards;
+        slope ? *slope
+              : (sight_.least_z_between_m(stand(line.number, i), over_columns_ ? line.number : i,
+                                          over_columns_ ? i : line.number, over_columns_, across,
+                                          across - outwards_) -
+                 eye_z_m) /
+                    forwards;
     if (s <= highest) return;
     highest = s;
     least_s = std::max(least_s, below(static_cast<float>(s)));

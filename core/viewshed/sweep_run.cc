@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/geodesy/predicates.h"
+#include "core/memory/large_array.h"
 
 namespace scarp {
 namespace {
@@ -237,7 +238,10 @@ void SweepRun::halve_bins() {
 void SweepRun::sweep_slab(std::int32_t first, std::int32_t count) {
   history_.begin_slab(first, outwards_, count, bins_);
   choose_strips(first, first + outwards_ * (count - 1));
-  for (const Strip& strip : strips_) sweep_strip(strip, first, count);
+  for (const Strip& strip : strips_) {
+    sweep_strip(strip, first, count);
+    relieve_large_memory();
+  }
 }
 
 void SweepRun::sweep_strip(const Strip& strip, std::int32_t first, std::int32_t count) {

@@ -60,8 +60,10 @@ bool SweepRun::is_blocked_in_bin(const Line& line, std::int32_t i, const Positio
   return history_.any_line(
       line.place, static_cast<std::int32_t>(bin), bins_, least, [&](std::int32_t across) {
         if (is_known && std::abs(across - eye_line_) > RayClimb::kLeastLines) {
-          const double above_m = ray.slope_at(across) * p.forwards - p.rise_m;
-          if (std::abs(above_m) > kClimbErrorM) return above_m > 0;
+          if (const auto slope = ray.slope_at(across)) {
+            const double above_m = *slope * p.forwards - p.rise_m;
+            if (std::abs(above_m) > kClimbErrorM) return above_m > 0;
+          }
         }
         // With the segments that lead to it from the line before it.
         return sight_.is_blocked_between(at, over_columns_ ? line.number : i,

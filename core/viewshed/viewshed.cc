@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "core/threads/for_each_target.h"
 #include "core/threads/parallel_for.h"
@@ -143,8 +144,8 @@ void LeastHeight::lower(const ViewGround& ground, const std::optional<EarthFrame
                         const ViewshedEye& eye, SweepCounts* counts) {
   const GroundGrid& grid = ground.stands;
   if (ground.tin) {
-    std::vector<float> own_m(least_m_.size());
-    add(heights_from(ground, earth, eye, own_m, counts), own_m);
+    LargeArray<float> own_m(least_m_.size());
+    add(heights_from(ground, earth, eye, own_m.span(), counts), own_m.span());
     return;
   }
   const EyeBearings bearings(eye.position, earth);
@@ -156,15 +157,20 @@ void LeastHeight::lower(const ViewGround& ground, const std::optional<EarthFrame
   SweptGround swept = ground.swept();
   swept.least_tops = &tops_;
   const SweepCounts found =
-      lower_heights(swept, eye.position, window_of(grid, eye, bearings), limit, least_m_);
+      lower_heights(swept, eye.position, window_of(grid, eye, bearings), limit, least_m_.span());
   if (counts) *counts = found;
 }
 
 LeastHeight::LeastHeight(const GroundGrid& grid)
     : columns_(static_cast<std::size_t>(grid.columns())),
-      least_m_(columns_ * static_cast<std::size_t>(grid.rows()),
-               std::numeric_limits<float>::quiet_NaN()),
-      tops_(grid) {}
+      least_m_(columns_ * static_cast<std::size_t>(grid.rows())),
+      tops_(grid) {
+  for_rows(whole_window(grid), [&](std::int32_t row) {
+    std::fill_n(least_m_.span().begin() +
+                    static_cast<std::ptrdiff_t>(static_cast<std::size_t>(row) * columns_),
+                columns_, std::numeric_limits<float>::quiet_NaN());
+  });
+}
 
 void LeastHeight::add(const SampleWindow& window, std::span<const float> least_m) {
   for_rows(window, [&](std::int32_t row) {

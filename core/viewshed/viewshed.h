@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "core/geodesy/earth_frame.h"
+#include "core/memory/large_array.h"
 #include "core/sight/tin_index.h"
 #include "core/terrain/ground_grid.h"
 #include "core/viewshed/grid_sight.h"
@@ -85,11 +85,11 @@ class AnyEye {
   /// Nothing seen yet: hidden, and unknown where void.
   explicit AnyEye(const GroundGrid& grid);
   void add(const SampleWindow& window, std::span<const Seen> sight);
-  std::span<const Seen> seen() const { return sight_; }
+  std::span<const Seen> seen() const { return sight_.span(); }
 
  private:
   std::size_t columns_;
-  std::vector<Seen> sight_;
+  LargeArray<Seen> sight_;
 };
 
 /// By how many of the eyes so far a sample is seen for certain.
@@ -99,11 +99,11 @@ class EyeCount {
 
   explicit EyeCount(const GroundGrid& grid);
   void add(const SampleWindow& window, std::span<const Seen> sight);
-  std::span<const std::uint32_t> counts() const { return counts_; }
+  std::span<const std::uint32_t> counts() const { return counts_.span(); }
 
  private:
   std::size_t columns_;
-  std::vector<std::uint32_t> counts_;
+  LargeArray<std::uint32_t> counts_;
 };
 
 /// The least height so far, over the eyes that have one; NaN where none has.
@@ -115,12 +115,12 @@ class LeastHeight {
   void lower(const ViewGround& ground, const std::optional<EarthFrame>& earth,
              const ViewshedEye& eye, SweepCounts* counts = nullptr);
   void add(const SampleWindow& window, std::span<const float> least_m);
-  std::span<float> heights_m() { return least_m_; }
-  std::span<const float> heights_m() const { return least_m_; }
+  std::span<float> heights_m() { return least_m_.span(); }
+  std::span<const float> heights_m() const { return least_m_.span(); }
 
  private:
   std::size_t columns_;
-  std::vector<float> least_m_;
+  LargeArray<float> least_m_;
   LeastTops tops_;
 };
 

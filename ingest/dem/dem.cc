@@ -13,6 +13,7 @@
 #include <span>
 
 #include "core/error/error.h"
+#include "core/memory/large_array.h"
 #include "core/threads/for_each_target.h"
 #include "core/threads/parallel_for.h"
 #include "ingest/dem/gdal_session.h"
@@ -308,6 +309,7 @@ class HeightReader {
             known);
         if (options_.nodata) std::fill(known, known + width, std::uint8_t{255});
       }
+      relieve_large_memory();
     }
   }
 
@@ -500,17 +502,48 @@ std::uint64_t read_rows_into(GroundGrid& grid, const Dem& dem, const Source& sou
   return known_count;
 }
 
+/// Is the budget too small for all in memory?
+bool is_tight(const Dem& dem, const DemOptions& options, double bytes_per_sample) {
+  const double needed = static_cast<double>(dem.columns) * dem.rows *
+                        (bytes_per_sample + options.more_bytes_per_sample);
+  return options.memory_budget_bytes && needed > static_cast<double>(options.memory_budget_bytes);
+}
+
 /// Refuses before allocating what will not fit.
 void check_memory(const Dem& dem, const DemOptions& options, double bytes_per_sample,
                   const std::string& file) {
   const double needed = static_cast<double>(dem.columns) * dem.rows *
                         (bytes_per_sample + options.more_bytes_per_sample);
-  if (options.memory_budget_bytes && needed > static_cast<double>(options.memory_budget_bytes))
+  if (is_tight(dem, options, bytes_per_sample))
     throw Error(ErrorCode::kResource,
                 fmt::format("'{}': {} x {} samples need about {:.1f} GiB, and --memory allows "
                             "{:.1f}; raise --memory, or cut the DEM with gdal_translate -projwin",
                             file, dem.columns, dem.rows, needed / (1 << 30),
                             static_cast<double>(options.memory_budget_bytes) / (1 << 30)));
+}
+
+/// What GDAL's cache has to hold so that no block is unpacked twice, in files that are read by
+/// bands of rows.
+double reading_bytes(const std::vector<Source>& sources) {
+  double most = 0;
+  for (const Source& source : sources) {
+    int block_columns = 1, block_rows = 1;
+    source.band->GetBlockSize(&block_columns, &block_rows);
+    most = std::max(most, static_cast<double>(block_rows) * (source.columns + block_columns) *
+                              GDALGetDataTypeSizeBytes(source.band->GetRasterDataType()));
+  }
+  constexpr double kLeast = 4e6;
+  return std::max(kLeast, thread_count() * most);
+}
+
+/// Makes room elsewhere, or refuses.
+void make_room(const Dem& dem, const DemOptions& options, const std::vector<Source>& sources) {
+  if (!is_tight(dem, options, kBytesPerGroundSample)) return;
+  const double bytes = reading_bytes(sources);
+  if (options.make_room && options.make_room(static_cast<double>(dem.columns) * dem.rows, bytes))
+    GDALSetCacheMax64(static_cast<GIntBig>(bytes));
+  else
+    check_memory(dem, options, kBytesPerGroundSample, sources.front().file);
 }
 
 }  // namespace
@@ -555,7 +588,7 @@ Ground read_ground(const std::vector<std::string>& files, const DemOptions& opti
   std::vector<Source> sources;
   for (const std::string& file : files) sources.push_back(open_source(file));
   lay_out(sources, dem);
-  check_memory(dem, options, kBytesPerGroundSample, files.front());
+  make_room(dem, options, sources);
   make_frame(sources.front(), options, dem);
   ground.grid = GroundGrid(dem.columns, dem.rows, ground_placement(dem));
   std::uint64_t known = 0;
