@@ -2,6 +2,7 @@
 #include <cmath>
 #include <variant>
 
+#include "core/memory/large_array.h"
 #include "core/viewshed/sweep_run.h"
 
 namespace scarp {
@@ -69,10 +70,19 @@ void SweepRun::take_samples(Line& to, std::int32_t first, std::int32_t last) {
   to.s.resize(count);
   to.z_m.resize(count);
   to.is_void.resize(count);
+  // Each sample of a column may bring a page of its own into memory, and its neighbours.
+  constexpr std::size_t kSamplesAtOnce = 128;
+  const std::size_t at_once = over_columns_ ? kSamplesAtOnce : count;
+  const std::size_t stride = over_columns_ ? grid_.stride() : 1;
   const std::int32_t* steps =
       over_columns_ ? grid_.row_steps(first) + to.number : grid_.row_steps(to.number) + first;
-  to.has_void = load_heights(steps, over_columns_ ? grid_.stride() : 1, count, to.z_m.data(),
-                             to.is_void.data());
+  to.has_void = false;
+  for (std::size_t k = 0; k < count; k += at_once) {
+    if (load_heights(steps + k * stride, stride, std::min(at_once, count - k), &to.z_m[k],
+                     &to.is_void[k]))
+      to.has_void = true;
+    relieve_large_memory();
+  }
   take_pictures(to, to.z_m.data(), to.t.data(), to.s.data());
 }
 

@@ -85,6 +85,7 @@ SweepCounts SweepRun::run() {
     const auto last = static_cast<std::int32_t>(end - outwards_);
     if (tile_ && (end == border || ColumnTile::is_last_in_tile(last, outwards_)))
       tile_->flush(last, grid_.columns(), output_.result);
+    relieve_large_memory();
     at = end;
   }
   return counts_;
@@ -238,10 +239,7 @@ void SweepRun::halve_bins() {
 void SweepRun::sweep_slab(std::int32_t first, std::int32_t count) {
   history_.begin_slab(first, outwards_, count, bins_);
   choose_strips(first, first + outwards_ * (count - 1));
-  for (const Strip& strip : strips_) {
-    sweep_strip(strip, first, count);
-    relieve_large_memory();
-  }
+  for (const Strip& strip : strips_) sweep_strip(strip, first, count);
 }
 
 void SweepRun::sweep_strip(const Strip& strip, std::int32_t first, std::int32_t count) {
