@@ -9,6 +9,7 @@
 #include "cli/build/report.h"
 #include "cli/commands.h"
 #include "cli/loaded_scene.h"
+#include "cli/outputs.h"
 #include "cli/picture_size.h"
 #include "cli/scene_culling.h"
 #include "cli/stages.h"
@@ -37,7 +38,7 @@ class Build {
   explicit Build(const BuildOptions& options)
       : options_(options),
         stages_(!options.common.json),
-        writer_(options.scene, options.common.overwrite ? Existing::kReplace : Existing::kRefuse) {
+        writer_(options.scene, existing(options.common)) {
     tile_.id = kOnlyTile;
   }
 

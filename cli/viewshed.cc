@@ -9,9 +9,11 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <set>
 
 #include "cli/build/layers.h"
 #include "cli/commands.h"
+#include "cli/outputs.h"
 #include "cli/scratch_memory.h"
 #include "cli/stages.h"
 #include "cli/view_source.h"
@@ -116,6 +118,23 @@ void check_total(const ViewshedOptions& options) {
                             single));
 }
 
+/// No output may take the place of an input, or of another output.
+void check_names(const ViewshedOptions& options) {
+  std::vector<std::string> taken = options.sources;
+  taken.insert(taken.end(), options.obstacles.begin(), options.obstacles.end());
+  if (!options.observers_file.empty()) taken.push_back(options.observers_file);
+  for (const std::string& file : {options.output, options.polygons}) {
+    if (file.empty()) continue;
+    for (const std::string& other : taken) {
+      std::error_code no_file;
+      if (file == other || std::filesystem::equivalent(file, other, no_file))
+        throw Error(ErrorCode::kUsage,
+                    fmt::format("'{}': is named twice; an output needs a name of its own", file));
+    }
+    taken.push_back(file);
+  }
+}
+
 /// Wrong use shows before any work.
 void check_options(const ViewshedOptions& options) {
   if (options.total) {
@@ -138,12 +157,9 @@ void check_options(const ViewshedOptions& options) {
       (options.mode == ViewshedMode::kGround || options.mode == ViewshedMode::kDem))
     throw Error(ErrorCode::kUsage,
                 "--polygons is for --mode visible and count; leave one of them out");
+  check_names(options);
   for (const std::string& file : {options.output, options.polygons})
-    if (!file.empty() && !options.common.overwrite && std::filesystem::exists(file))
-      throw Error(ErrorCode::kInput,
-                  fmt::format("'{}': exists; a new file was expected; give --overwrite to replace "
-                              "it",
-                              file));
+    check_new_file(file, options.common);
   if (!options.each_folder.empty() && !std::filesystem::is_directory(options.each_folder))
     throw Error(ErrorCode::kInput,
                 fmt::format("'{}': is no folder; one for the rasters of --each was expected; make "
@@ -201,10 +217,29 @@ class ViewshedRun {
                        limits_of(options_.min_distance_m, options_.max_distance_m,
                                  options_.azimuth_deg, options_.pitch_deg),
                        ""});
-    if (options_.observers_file.empty()) return;
-    const std::string& wkt = source_->dem().frame->description().crs_wkt;
-    for (const ObserverRecord& record : read_observers(options_.observers_file, wkt, options_.crs))
-      eyes_.push_back(eye_of(record, options_, *source_));
+    if (!options_.observers_file.empty()) {
+      const std::string& wkt = source_->dem().frame->description().crs_wkt;
+      for (const ObserverRecord& record :
+           read_observers(options_.observers_file, wkt, options_.crs))
+        eyes_.push_back(eye_of(record, options_, *source_));
+    }
+    if (!options_.each_folder.empty()) name_each();
+  }
+
+  /// Gives the raster of each eye a name of its own.
+  void name_each() {
+    std::set<std::string> taken;
+    for (std::size_t i = 0; i < eyes_.size(); ++i) {
+      std::string name = eyes_[i].name;
+      for (char& c : name)
+        if (c == '/' || c == '\\' || c == '\0') c = '_';
+      if (name.empty() || name.front() == '.') name = fmt::format("{:04}", i + 1);
+      std::string own = name;
+      for (int again = 2; !taken.insert(own).second; ++again)
+        own = fmt::format("{}_{}", name, again);
+      each_paths_.push_back(fmt::format("{}/{}.tif", options_.each_folder, own));
+      check_new_file(each_paths_.back(), options_.common);
+    }
   }
 
   /// Puts the large arrays on the disk where memory is tight but enough for blocks.
@@ -315,17 +350,9 @@ class ViewshedRun {
     decided_.add(counts);
   }
 
-  Existing existing() const {
-    return options_.common.overwrite ? Existing::kReplace : Existing::kRefuse;
-  }
-
   /// The raster of the eye that was last seen from.
   void write_each(std::size_t i) {
-    std::string name = eyes_[i].name;
-    for (char& c : name)
-      if (c == '/' || c == '\\' || c == '\0') c = '_';
-    if (name.empty() || name.front() == '.') name = fmt::format("{:04}", i + 1);
-    const std::string path = fmt::format("{}/{}.tif", options_.each_folder, name);
+    const std::string& path = each_paths_[i];
     if (least_) {
       LeastHeight alone(source_->samples());
       alone.add(window_, eye_heights_m_.span());
@@ -368,14 +395,15 @@ class ViewshedRun {
                          "visible");
       layer.nodata = static_cast<double>(Seen::kUnknown);
     }
-    write_area_polygons(options_.polygons, layer, count_ ? "eyes" : "visible", existing());
+    write_area_polygons(options_.polygons, layer, count_ ? "eyes" : "visible",
+                        existing(options_.common));
   }
 
   void write_layer(const std::string& path, RasterLayer& layer, std::size_t first,
                    std::size_t end) const {
     describe(layer.metadata, first, end);
     layer.saves_memory = scratch_.has_value();
-    write_geotiff_cog(path, layer, existing());
+    write_geotiff_cog(path, layer, existing(options_.common));
   }
 
   /// @param first, end  the eyes that the raster is of
@@ -449,12 +477,7 @@ class ViewshedRun {
       observers += fmt::format("{}{:.10g},{:.10g},{:.3f}asl", i > first ? " " : "",
                                eyes_[i].at.map.x, eyes_[i].at.map.y, eyes_[i].at.map.height_m);
     metadata["MODE"] = options_.total ? "total" : name_of(options_.mode);
-    metadata["SURFACE"] = source_->surface();
-    metadata["EARTH"] = frame.earth == Earth::kFlat ? "flat" : "ellipsoid";
-    metadata["REFRACTION"] = fmt::format("{:g}", frame.refraction);
-    metadata["HEIGHTS"] = frame.earth == Earth::kFlat ? "above the map plane"
-                          : frame.geoid_file.empty()  ? "taken as ellipsoidal"
-                                                      : "geoid added";
+    write_note(note_of(source_->surface(), frame), metadata);
     metadata["HEIGHT_UNIT_OF_DEM"] = source_->dem().height_unit;
     if (!options_.total) {
       metadata["OBSERVERS"] = std::to_string(end - first);
@@ -517,9 +540,7 @@ class ViewshedRun {
       result["decided"] = {{"targets", decided_.targets},
                            {"compared_with_part", decided_.traced_part},
                            {"judged_whole", decided_.traced_whole}};
-      for (const StageCost& cost : stages_.costs())
-        result["stages"].push_back(
-            {{"name", cost.name}, {"seconds", cost.seconds}, {"peak_bytes", cost.peak_bytes}});
+      result["stages"] = stages_json(stages_);
       fmt::print("{}\n", result.dump(2));
       return;
     }
@@ -545,6 +566,7 @@ class ViewshedRun {
   std::optional<ScratchMemory> scratch_;  // holds what follows, where it is used
   std::optional<ViewSource> source_;
   std::vector<RunEye> eyes_;
+  std::vector<std::string> each_paths_;  // of --each, an eye each
   LargeArray<Seen> sight_;
   std::optional<AnyEye> any_;
   std::optional<EyeCount> count_;

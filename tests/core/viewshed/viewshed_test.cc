@@ -107,6 +107,33 @@ TEST(GridSightTest, WalkingFindsWhatTestingEverySegmentFinds) {
   }
 }
 
+/// Where the border of the data bends inwards, a line between two of its samples runs outside: no
+/// ground is there, neither to block nor to make anything unknown. On a straight border it runs
+/// over the samples, which block.
+TEST(GridSightTest, MeetsNoGroundOutsideTheData) {
+  for (const double inwards_m : {0.0, 5.0}) {
+    SampleGrid samples;
+    samples.columns = 6;
+    samples.rows = 9;
+    for (std::int32_t r = 0; r < samples.rows; ++r) {
+      for (std::int32_t c = 0; c < samples.columns; ++c) {
+        const double bow = 1 - (r - 4) * (r - 4) / 16.0;
+        samples.positions.push_back({c * 30 + inwards_m * bow, -r * 30.0, r == 4 ? 100.0 : 0.0});
+        samples.known.push_back(1);
+      }
+    }
+    const GroundGrid grid(samples);
+    Position eye = grid.at(0, 0);
+    eye.z_m += 2;
+    const GridSight judge(grid, eye);
+    const Seen expected = inwards_m > 0 ? Seen::kVisible : Seen::kHidden;
+    EXPECT_EQ(judge.judge(grid.at(0, 8), 0, 8), expected);
+    EXPECT_EQ(sight_by_every_segment(grid, eye, grid.at(0, 8)), expected);
+    EXPECT_EQ(swept(grid, eye, 0), judged(grid, eye, 0));
+    EXPECT_EQ(judge.judge(grid.at(1, 8), 1, 8), Seen::kHidden);
+  }
+}
+
 TEST(SweepViewshed, EqualsTheJudgeOnEveryCell) {
   for (GroundRecipe recipe : recipes()) {
     for (const std::int32_t size : {24, 90}) {
