@@ -9,6 +9,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <numeric>
 #include <set>
 
 #include "cli/build/layers.h"
@@ -276,11 +277,24 @@ class ViewshedRun {
     const bool alone = eyes_.size() == 1 &&
                        !(eyes_[0].limits.max_distance_m < std::numeric_limits<double>::infinity());
     if (options_.mode == ViewshedMode::kVisible && !alone) any_.emplace(grid);
-    for (std::size_t i = 0; i < eyes_.size(); ++i) {
+    std::size_t done = 0;
+    for (const std::size_t i : order_of_eyes()) {
       see_from(eyes_[i]);
       if (!options_.each_folder.empty()) write_each(i);
-      if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(eyes_.size()));
+      if (progress) progress(static_cast<double>(++done) / static_cast<double>(eyes_.size()));
     }
+  }
+
+  /// For heights the highest eyes first: they see most, and what is seen is not measured again. The
+  /// answer is the same in any order.
+  std::vector<std::size_t> order_of_eyes() const {
+    std::vector<std::size_t> order(eyes_.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    if (least_)
+      std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+        return eyes_[a].at.position.z_m > eyes_[b].at.position.z_m;
+      });
+    return order;
   }
 
   /// Looks from samples of the ground back at all places: sight is symmetric.
