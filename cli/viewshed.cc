@@ -311,7 +311,7 @@ class ViewshedRun {
     looks_share_ = static_cast<double>(looks_) / static_cast<double>(known);
     sight_ = LargeArray<Seen>(static_cast<std::size_t>(grid.columns()) *
                               static_cast<std::size_t>(grid.rows()));
-    SeenGround seen(grid);
+    SeenGround& seen = seen_ground_.emplace(grid);
     const ViewLimits limits = limits_of(options_.min_distance_m, options_.max_distance_m, {}, {});
     for (std::size_t i = 0; i < places.size(); ++i) {
       const Position ground =
@@ -325,12 +325,11 @@ class ViewshedRun {
       if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(places.size()));
     }
     sight_ = LargeArray<Seen>();
-    areas_km2_ = seen.areas_km2(looks_share_);
+    areas_km2_ = seen.finish_km2(looks_share_);
   }
 
   void write_total() {
-    RasterLayer layer =
-        layer_over(source_->dem(), std::span<const float>(areas_km2_.span()), "ground seen");
+    RasterLayer layer = layer_over(source_->dem(), areas_km2_, "ground seen");
     layer.unit = "km2";
     layer.nodata = std::numeric_limits<double>::quiet_NaN();
     layer.metadata["VALUES"] = "ground that is seen from here, square kilometres; NaN void";
@@ -585,7 +584,8 @@ class ViewshedRun {
   std::optional<AnyEye> any_;
   std::optional<EyeCount> count_;
   std::optional<LeastHeight> least_;
-  LargeArray<float> areas_km2_;  // of --total
+  std::optional<SeenGround> seen_ground_;  // of --total
+  std::span<const float> areas_km2_;       // in it
   std::size_t looks_ = 0;
   double looks_share_ = 1;  // of the known samples
   LargeArray<float> eye_heights_m_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "core/occlusion/splitmix64.h"
@@ -78,14 +79,18 @@ void SeenGround::add(const SampleWindow& window, std::span<const Seen> sight, do
       });
 }
 
-LargeArray<float> SeenGround::areas_km2(double share) const {
-  LargeArray<float> areas(area_m2_.size());
+std::span<const float> SeenGround::finish_km2(double share) {
   constexpr double kM2PerKm2 = 1e6;
-  parallel_for(areas.size() / columns_, [&](std::size_t row) {
-    for (std::size_t i = row * columns_; i < (row + 1) * columns_; ++i)
-      areas[i] = static_cast<float>(area_m2_[i] / share / kM2PerKm2);
-  });
-  return areas;
+  auto* bytes = reinterpret_cast<std::byte*>(area_m2_.span().data());
+  for (std::size_t i = 0; i < area_m2_.size(); ++i) {
+    double m2;
+    std::memcpy(&m2, bytes + i * sizeof(double), sizeof(double));
+    const auto km2 = static_cast<float>(m2 / share / kM2PerKm2);
+    std::memcpy(bytes + i * sizeof(float), &km2, sizeof(float));
+    constexpr std::size_t kAtOnce = std::size_t{1} << 18;
+    if (i % kAtOnce == 0) relieve_large_memory();
+  }
+  return {reinterpret_cast<const float*>(bytes), area_m2_.size()};
 }
 
 }  // namespace scarp

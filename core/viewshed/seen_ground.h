@@ -43,9 +43,10 @@ class SeenGround {
   explicit SeenGround(const GroundGrid& grid);
   /// @param sight  what a sample of ground of area_m2 has of targets at eye height
   void add(const SampleWindow& window, std::span<const Seen> sight, double area_m2);
+  /// Ends the sums, in whose memory the answer lies: nothing can be added afterwards.
   /// @return [rows * columns] square kilometres seen; NaN where void
   /// @param share  of the known samples that have looked, (0, 1]
-  LargeArray<float> areas_km2(double share) const;
+  std::span<const float> finish_km2(double share);
 
  private:
   std::size_t columns_;
