@@ -134,6 +134,31 @@ TEST(GridSightTest, MeetsNoGroundOutsideTheData) {
   }
 }
 
+/// A line that runs exactly over the samples of a slanted border: measuring cannot tell on which
+/// side of them it is.
+TEST(SweepViewshed, ComparesExactlyAlongTheBorder) {
+  for (const double slant_m : {7.0, -11.0, 3.0, -19.0}) {
+    SampleGrid samples;
+    samples.columns = 40;
+    samples.rows = 41;
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> unit(0, 1);
+    for (std::int32_t r = 0; r < samples.rows; ++r) {
+      for (std::int32_t c = 0; c < samples.columns; ++c) {
+        samples.positions.push_back(
+            round_to_lattice(Position{c * 31 + r * slant_m, -r * 30.0, 30 * unit(random)}));
+        samples.known.push_back(1);
+      }
+    }
+    const GroundGrid grid(samples);
+    for (const auto& [column, row] : {std::pair(0, 0), std::pair(39, 40), std::pair(0, 22)}) {
+      Position eye = grid.at(column, row);
+      eye.z_m += 12;
+      EXPECT_EQ(swept(grid, eye, 0), judged(grid, eye, 0)) << "slant " << slant_m;
+    }
+  }
+}
+
 TEST(SweepViewshed, EqualsTheJudgeOnEveryCell) {
   for (GroundRecipe recipe : recipes()) {
     for (const std::int32_t size : {24, 90}) {
@@ -167,7 +192,7 @@ TEST(SweepViewshed, PassesOverNothingThatIsSeen) {
         const GroundGrid grid = random_ground({relief, 190, 170, bend, void_share, 5});
         std::mt19937 random(11);
         for (const Position& eye : eyes_for(grid, random, 2)) {
-          const double target_m = relief == Relief::kSmooth ? 3 : 0;
+          const double target_m = relief == Relief::kSmooth ? 40 : 0;
           SweepCounts counts;
           const auto expected = judged(grid, eye, target_m);
           ASSERT_EQ(swept(grid, eye, target_m, &counts), expected)
