@@ -59,7 +59,7 @@ struct ViewGround {
 /// @param earth        of the grid's frame; nothing where it is flat
 /// @param sight[out]   [rows * columns]; only the window returned is written
 /// @return the window within reach; outside it nothing is within the limits
-/// Cost: see PartSweep; with limits besides distance, a bearing for each sample seen.
+/// Cost: see part_sweep.h; with limits besides distance, a bearing for each sample seen.
 SampleWindow view_from(const ViewGround& ground, const std::optional<EarthFrame>& earth,
                        const ViewshedEye& eye, std::span<Seen> sight,
                        SweepCounts* counts = nullptr);
