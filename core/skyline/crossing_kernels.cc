@@ -4,6 +4,8 @@
 // After foreach_target.h, which includes this file once more for each instruction set.
 #include <hwy/highway.h>
 
+#include <algorithm>
+
 #include "core/skyline/crossing_kernels.h"
 #include "core/skyline/march_ground.h"
 
@@ -32,50 +34,49 @@ HWY_INLINE bool takes_part(unsigned groups, std::size_t ray) {
   return (groups >> (ray / kGroup) & 1) != 0;
 }
 
-void meet_now(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift, unsigned groups,
-              RayBundle& rays) {
+/// @tparam kFans  places and runs differ from ray to ray
+template <bool kError, bool kDistance, bool kFans>
+HWY_INLINE unsigned meet_noting(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift,
+                                unsigned groups, RayBundle& rays) {
+  unsigned raised = 0;
   for (std::size_t ray = 0; ray < kBundle; ray += hn::Lanes(kTag)) {
     if (!takes_part(groups, ray)) continue;
-    Vector greatest = hn::Load(kTag, rays.slope + ray), error = hn::Load(kTag, rays.error + ray);
+    const Vector before = hn::Load(kTag, rays.slope + ray);
     const Vector eye = hn::Load(kTag, rays.eye_z + ray);
     const Vector number = hn::Iota(kTag, static_cast<float>(ray));
+    Vector greatest = before, error = hn::Load(kTag, rays.error + ray);
+    Vector run = hn::Load(kTag, rays.slope_run + ray);
     for (std::size_t i = 0; i < count; ++i) {
       const Crossing& c = crossings[i];
       const Vector a = hn::LoadU(kTag, c.a + shift + ray);
       const Vector difference = hn::LoadU(kTag, c.b + shift + ray) - a;
-      const Vector share = value(c.share) + value(c.share_step) * number;
-      const Vector inverse = value(c.inverse_run) + value(c.inverse_run_step) * number;
-      greatest = hn::Max(greatest, ((a - eye) + share * difference) * inverse);
-      error = hn::Max(error, steepness(difference) * value(c.slack));
+      Vector share = value(c.share), inverse = value(c.inverse_run);
+      if constexpr (kFans) {
+        share = share + value(c.share_step) * number;
+        inverse = inverse + value(c.inverse_run_step) * number;
+      }
+      const Vector slope = ((a - eye) + share * difference) * inverse;
+      if constexpr (kDistance)
+        run = hn::IfThenElse(greatest < slope, value(1 / c.inverse_run), run);
+      greatest = hn::Max(greatest, slope);
+      if constexpr (kError) error = hn::Max(error, steepness(difference) * value(c.slack));
     }
+    if (!hn::AllFalse(kTag, before < greatest)) raised |= 1U << (ray / kGroup);
     hn::Store(greatest, kTag, rays.slope + ray);
-    hn::Store(error, kTag, rays.error + ray);
+    if constexpr (kError) hn::Store(error, kTag, rays.error + ray);
+    if constexpr (kDistance) hn::Store(run, kTag, rays.slope_run + ray);
   }
+  return raised;
 }
 
-void meet_and_measure_now(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift,
-                          unsigned groups, RayBundle& rays) {
-  for (std::size_t ray = 0; ray < kBundle; ray += hn::Lanes(kTag)) {
-    if (!takes_part(groups, ray)) continue;
-    Vector greatest = hn::Load(kTag, rays.slope + ray), error = hn::Load(kTag, rays.error + ray);
-    Vector run = hn::Load(kTag, rays.slope_run + ray);
-    const Vector eye = hn::Load(kTag, rays.eye_z + ray);
-    const Vector number = hn::Iota(kTag, static_cast<float>(ray));
-    for (std::size_t i = 0; i < count; ++i) {
-      const Crossing& c = crossings[i];
-      const Vector a = hn::LoadU(kTag, c.a + shift + ray);
-      const Vector difference = hn::LoadU(kTag, c.b + shift + ray) - a;
-      const Vector share = value(c.share) + value(c.share_step) * number;
-      const Vector inverse = value(c.inverse_run) + value(c.inverse_run_step) * number;
-      const Vector slope = ((a - eye) + share * difference) * inverse;
-      run = hn::IfThenElse(greatest < slope, value(1 / c.inverse_run), run);
-      greatest = hn::Max(greatest, slope);
-      error = hn::Max(error, steepness(difference) * value(c.slack));
-    }
-    hn::Store(run, kTag, rays.slope_run + ray);
-    hn::Store(greatest, kTag, rays.slope + ray);
-    hn::Store(error, kTag, rays.error + ray);
-  }
+unsigned meet_now(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift,
+                  unsigned groups, const MeetNotes& notes, bool fans, RayBundle& rays) {
+  if (notes.distance) return meet_noting<true, true, true>(crossings, count, shift, groups, rays);
+  if (notes.error)
+    return fans ? meet_noting<true, false, true>(crossings, count, shift, groups, rays)
+                : meet_noting<true, false, false>(crossings, count, shift, groups, rays);
+  return fans ? meet_noting<false, false, true>(crossings, count, shift, groups, rays)
+              : meet_noting<false, false, false>(crossings, count, shift, groups, rays);
 }
 
 void meet_high_now(const PossibleCrossing& c, unsigned groups, RayBundle& rays) {
@@ -102,9 +103,10 @@ void meet_high_now(const PossibleCrossing& c, unsigned groups, RayBundle& rays) 
   }
 }
 
-void meet_loosely_now(const LooseCrossing& c, RayBundle& rays) {
+unsigned meet_loosely_now(const LooseCrossing& c, RayBundle& rays) {
   const Vector none = value(MarchGround::kNothing), bound = value(kGroundBound);
   const Vector zero = hn::Zero(kTag);
+  unsigned raised = 0;
   const std::size_t lanes = hn::Lanes(kTag);
   const auto end = static_cast<std::size_t>(c.end_ray);
   for (std::size_t ray = static_cast<std::size_t>(c.first_ray) / lanes * lanes; ray < end;
@@ -137,34 +139,52 @@ void meet_loosely_now(const LooseCrossing& c, RayBundle& rays) {
     const Vector high = hn::Load(kTag, rays.high + ray);
     hn::Store(hn::IfThenElse(high < most, value(1 / c.inverse_run), hn::Load(kTag, rays.run + ray)),
               kTag, rays.run + ray);
-    hn::Store(hn::Max(hn::Load(kTag, rays.low + ray), least), kTag, rays.low + ray);
+    const Vector low = hn::Load(kTag, rays.low + ray);
+    if (!hn::AllFalse(kTag, low < least)) raised |= 1U << (ray / kGroup);
+    hn::Store(hn::Max(low, least), kTag, rays.low + ray);
     hn::Store(hn::Max(high, most), kTag, rays.high + ray);
   }
+  return raised;
 }
 
-unsigned may_block_now(const Square& square, float tolerance, unsigned groups, RayBundle& rays) {
-  unsigned open = 0;
-  alignas(64) float raised[kBundle];
+/// The steepest that rays can see the ground of a square.
+HWY_INLINE Vector steepest(const Square& square, std::size_t ray, Vector eye) {
+  Vector most = hn::LoadU(kTag, square.highest[0] + ray);
+  for (int i = 1; i < square.count; ++i)
+    most = hn::Max(most, hn::LoadU(kTag, square.highest[i] + ray));
+  const Vector rise = most - eye;
+  return hn::Max(rise * value(square.inverse_near), rise * value(square.inverse_far));
+}
+
+void may_block_now(const Square* squares, std::size_t count, float tolerance, unsigned groups,
+                   RayBundle& rays, unsigned* open) {
+  for (std::size_t i = 0; i < count; ++i) open[i] = 0;
   const std::size_t lanes = hn::Lanes(kTag);
-  for (std::size_t ray = 0; ray < kBundle; ray += lanes) {
-    if (!takes_part(groups, ray)) continue;
-    Vector most = hn::LoadU(kTag, square.highest[0] + ray);
-    for (int i = 1; i < square.count; ++i)
-      most = hn::Max(most, hn::LoadU(kTag, square.highest[i] + ray));
-    const Vector rise = most - hn::Load(kTag, rays.eye_z + ray);
-    const Vector slope =
-        hn::Max(rise * value(square.inverse_near), rise * value(square.inverse_far));
-    const Vector least =
-        hn::Max(hn::Max(hn::Load(kTag, rays.low + ray), hn::Load(kTag, rays.slope + ray)) +
-                    value(tolerance),
-                value(RayBundle::kNone));
-    hn::Store(hn::Max(hn::Load(kTag, rays.rest + ray), slope), kTag, raised + ray);
-    if (!hn::AllFalse(kTag, slope > least)) open |= 1U << (ray / kGroup);
+  for (std::size_t first = 0; first < kBundle; first += kGroup) {
+    if (!takes_part(groups, first)) continue;
+    for (std::size_t i = 0; i < count; ++i) {
+      bool is_open = false;
+      for (std::size_t ray = first; ray < first + kGroup; ray += lanes) {
+        const Vector met =
+            hn::Max(hn::Load(kTag, rays.low + ray), hn::Load(kTag, rays.slope + ray));
+        const Vector least = hn::Max(met + value(tolerance), value(RayBundle::kNone));
+        const Vector slope = steepest(squares[i], ray, hn::Load(kTag, rays.eye_z + ray));
+        is_open = is_open || !hn::AllFalse(kTag, slope > least);
+        // In one vector a group is decided at once.
+        if (lanes == kGroup && !is_open)
+          hn::Store(hn::Max(hn::Load(kTag, rays.rest + ray), slope), kTag, rays.rest + ray);
+      }
+      if (is_open) {
+        open[i] |= 1U << (first / kGroup);
+        continue;
+      }
+      if (lanes == kGroup) continue;
+      for (std::size_t ray = first; ray < first + kGroup; ray += lanes) {
+        const Vector slope = steepest(squares[i], ray, hn::Load(kTag, rays.eye_z + ray));
+        hn::Store(hn::Max(hn::Load(kTag, rays.rest + ray), slope), kTag, rays.rest + ray);
+      }
+    }
   }
-  for (std::size_t ray = 0; ray < kBundle; ray += lanes)
-    if (takes_part(groups & ~open, ray))
-      hn::Store(hn::Load(kTag, raised + ray), kTag, rays.rest + ray);
-  return open;
 }
 
 /// Known ground and void that rays meet, in this order.
@@ -256,7 +276,8 @@ void elevations_now(const ElevationRow& k, const RayBundle& rays, std::int16_t* 
     const Vector rise = value(k.rise) + number * value(k.rise_step) + z * value(k.rise_z);
     const Vector shrink = value(k.shrink) + number * value(k.shrink_step);
     const Vector slope = hn::Load(kTag, rays.slope + i);
-    const Vector error = hn::Load(kTag, rays.error + i) + hn::Abs(slope) * value(k.drift);
+    const Vector error = hn::Max(hn::Load(kTag, rays.error + i), value(k.least_error)) +
+                         hn::Abs(slope) * value(k.drift);
     const Vector ray_low = hn::Max(hn::Load(kTag, rays.low + i), slope - error);
     const Vector loose_high = hn::Load(kTag, rays.high + i);
     const Vector ray_high = hn::Max(loose_high, slope + error);
@@ -294,7 +315,6 @@ HWY_AFTER_NAMESPACE();
 namespace scarp {
 
 HWY_EXPORT(meet_now);
-HWY_EXPORT(meet_and_measure_now);
 HWY_EXPORT(meet_high_now);
 HWY_EXPORT(meet_loosely_now);
 HWY_EXPORT(may_block_now);
@@ -303,26 +323,25 @@ HWY_EXPORT(note_void_now);
 HWY_EXPORT(note_void_loosely_now);
 HWY_EXPORT(note_ground_behind_now);
 
-void meet(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift, unsigned groups,
-          RayBundle& rays) {
-  HWY_DYNAMIC_DISPATCH(meet_now)(crossings, count, shift, groups, rays);
-}
-
-void meet_and_measure(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift,
-                      unsigned groups, RayBundle& rays) {
-  HWY_DYNAMIC_DISPATCH(meet_and_measure_now)(crossings, count, shift, groups, rays);
+unsigned meet(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift, unsigned groups,
+              const MeetNotes& notes, RayBundle& rays) {
+  const bool fans = std::any_of(crossings, crossings + count, [](const Crossing& c) {
+    return c.share_step != 0 || c.inverse_run_step != 0;
+  });
+  return HWY_DYNAMIC_DISPATCH(meet_now)(crossings, count, shift, groups, notes, fans, rays);
 }
 
 void meet_high(const PossibleCrossing& crossing, unsigned groups, RayBundle& rays) {
   HWY_DYNAMIC_DISPATCH(meet_high_now)(crossing, groups, rays);
 }
 
-void meet_loosely(const LooseCrossing& crossing, RayBundle& rays) {
-  HWY_DYNAMIC_DISPATCH(meet_loosely_now)(crossing, rays);
+unsigned meet_loosely(const LooseCrossing& crossing, RayBundle& rays) {
+  return HWY_DYNAMIC_DISPATCH(meet_loosely_now)(crossing, rays);
 }
 
-unsigned may_block(const Square& square, float tolerance, unsigned groups, RayBundle& rays) {
-  return HWY_DYNAMIC_DISPATCH(may_block_now)(square, tolerance, groups, rays);
+void may_block(const Square* squares, std::size_t count, float tolerance, unsigned groups,
+               RayBundle& rays, unsigned* open) {
+  HWY_DYNAMIC_DISPATCH(may_block_now)(squares, count, tolerance, groups, rays, open);
 }
 
 void elevations(const ElevationRow& row, const RayBundle& rays, std::int16_t* estimate,

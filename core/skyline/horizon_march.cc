@@ -10,14 +10,20 @@
 namespace scarp {
 namespace {
 
-/// Lines that every ray crosses one by one; then squares take over.
+/// Lines that every ray crosses one by one; then strips take over.
 constexpr std::int32_t kNearLines = 16;
 
-/// Squares are asked first as large as this share of their distance.
-constexpr std::int32_t kDistanceInSquares = 2;
+/// Strips are asked first as deep as this share of their distance.
+constexpr std::int32_t kDistanceInStrips = 2;
 
-/// Beforehand, lines are crossed this share of their distance apart.
+/// Where nothing is known of the neighbours' horizons, lines this share of their distance apart are
+/// crossed beforehand.
 constexpr std::int32_t kDistanceInSteps = 8;
+
+/// Of the nearest lines the errors of crossings are measured; farther ones take the greatest that
+/// the steepest ground of all makes possible, where that is no more than this, as a slope.
+constexpr std::int32_t kMeasuredLines = 4;
+constexpr double kCheapError = 1e-4;
 
 constexpr unsigned kAllGroups = (1U << kGroups) - 1;
 
@@ -35,7 +41,7 @@ class BundleMarch {
         search_(search),
         exact_(fan.slack_fixed == 0 && fan.slack_rate == 0),
         steps_(fan.place.size()),
-        lane_ranges_(fan.place.size()) {}
+        most_along_(most_along()) {}
 
   /// Lines of cells that share the places of their crossings: so many that these are off by
   /// kStripeSlack at most.
@@ -49,8 +55,15 @@ class BundleMarch {
   /// Relative error of the runs of the crossings so far in the stripe.
   double drift() const { return drift_; }
 
+  /// Bound of the error of crossings that were not measured so far in the bundle, as a slope.
+  double least_error() const { return least_error_; }
+
   /// Begins a stripe of bundles, one above the other.
   void begin_stripe(std::int32_t lane, std::int32_t first_line, std::int32_t lines) {
+    if (lane != lane_ || stripe_ == 0) {
+      knows_strips_ = false;
+      productive_.clear();
+    }
     lane_ = lane;
     const double p = lane - tile_.first_lane - (tile_.lanes - 1) / 2.0;
     const double q = first_line + (lines - 1) / 2.0 - tile_.first_line - (tile_.lines - 1) / 2.0;
@@ -61,6 +74,7 @@ class BundleMarch {
     first_line_ = first_line;
     near_.clear();
     near_end_.assign(1, 0);
+    near_slack_.assign(1, 0);
     unsure_.clear();
   }
 
@@ -72,21 +86,45 @@ class BundleMarch {
     if (reach_ < 1) return;
     notes_void_ = ground_.has_void();
     const std::int32_t near = last_near_line();
+    least_error_ = 0;
     if (notes_void_)
       cross_lines(1, near, kAllGroups);
     else
       cross_near(near);
-    cross_some(near + 1);
-    list_squares(near + 1);
-    for (const Span& span : spans_) search_span(span, kAllGroups);
+    crossed_.clear();
+    if (knows_strips_)
+      cross_productive(near);
+    else
+      cross_some(near + 1);
+    knows_strips_ = true;
+    list_spans(near + 1);
+    if (notes_void_)
+      for (const Span& span : spans_) search_span(span, kAllGroups);
+    else
+      search_spans();
   }
 
  private:
-  /// Lines [first, last], counted from the rays' begins, that a row of squares holds.
+  /// Lines [first, last], counted from the rays' begins, that a strip holds; rays enter it with the
+  /// first.
   struct Span {
     int level;
-    std::int32_t block, first, last;
+    std::int32_t strip, first, last;
   };
+  /// A strip of the least level, and groups of the bundle.
+  struct StripGroups {
+    std::int32_t strip;
+    unsigned groups;
+  };
+
+  /// Lanes by which any ray of the tile moves from a line to the next at most.
+  double most_along() const {
+    double most = 0;
+    for (std::size_t k = 1; k < fan_.place.size(); ++k)
+      most = std::max(most, std::abs(fan_.place[k] - fan_.place[k - 1]));
+    return most + std::abs(fan_.turn.middle) + std::abs(fan_.turn.per_lane) * tile_.lanes +
+           std::abs(fan_.turn.per_line) * tile_.lines;
+  }
 
   std::int32_t line_at(std::int32_t k) const { return line_ + fan_.line_step * k; }
   /// Lanes from the begin of the bundle's first ray at the k-th line, and from ray to ray.
@@ -102,13 +140,12 @@ class BundleMarch {
     return lane_ + offset + kBundle < 0 || lane_ + offset > ground_.lanes() - 1;
   }
 
-  /// Squares begin where blocks do.
   std::int32_t last_near_line() const {
     std::int32_t k = std::min(kNearLines, reach_);
-    while (k < reach_ && !begins_block(k + 1, MarchGround::kLeastLevel)) ++k;
+    while (k < reach_ && !begins_strip(k + 1, MarchGround::kLeastLevel)) ++k;
     return k;
   }
-  bool begins_block(std::int32_t k, int level) const {
+  bool begins_strip(std::int32_t k, int level) const {
     const std::int32_t line = line_at(k) + (fan_.line_step > 0 ? 0 : 1);
     return (line & ((1 << level) - 1)) == 0;
   }
@@ -119,7 +156,9 @@ class BundleMarch {
     for (auto k = static_cast<std::int32_t>(near_end_.size()); k <= last; ++k) {
       const Step& step = step_at(k);
       const std::ptrdiff_t shift = (first_line_ - step.line) * ground_.stride();
+      double slack = near_slack_.back();
       const auto keep = [&](const Crossing& crossing) {
+        if (k > kMeasuredLines) slack = std::max(slack, double{crossing.slack});
         near_.push_back(crossing);
         near_.back().a += shift;
         near_.back().b += shift;
@@ -128,13 +167,15 @@ class BundleMarch {
       if (step.is_line_sure) keep(step.at_line);
       if (!step.is_between_sure || !step.is_line_sure) unsure_.push_back(k);
       near_end_.push_back(near_.size());
+      near_slack_.push_back(slack);
     }
     const std::size_t count = near_end_[static_cast<std::size_t>(last)];
     const std::ptrdiff_t shift = (line_ - first_line_) * ground_.stride();
-    if (search_.measures_distance)
-      meet_and_measure(near_.data(), count, shift, kAllGroups, *rays_);
-    else
-      meet(near_.data(), count, shift, kAllGroups, *rays_);
+    const std::size_t measured = near_end_[static_cast<std::size_t>(std::min(kMeasuredLines, last))];
+    const MeetNotes notes{true, search_.measures_distance};
+    meet(near_.data(), measured, shift, kAllGroups, notes, *rays_);
+    meet(near_.data() + measured, count - measured, shift, kAllGroups,
+         notes_for(near_slack_[static_cast<std::size_t>(last)]), *rays_);
     for (const std::int32_t k : unsure_) {
       if (k > last) break;
       const Step& step = step_at(k);
@@ -143,8 +184,36 @@ class BundleMarch {
     }
   }
 
-  /// Some lines at growing distances, so that low bounds are good before squares are asked. They
-  /// are lines that the neighbouring bundles cross too, where they can be.
+  /// What to measure of crossings with slacks up to this.
+  MeetNotes notes_for(double slack) {
+    const double error = slack * ground_.steepest_m();
+    if (error > kCheapError) return {true, search_.measures_distance};
+    least_error_ = std::max(least_error_, error);
+    return {false, search_.measures_distance};
+  }
+
+  /// Strips in which rays of the bundle before this one met their horizons, so that low bounds are
+  /// good before strips are asked. The last that raised them come first, so that those which they
+  /// surpass are forgotten.
+  void cross_productive(std::int32_t near) {
+    before_.swap(productive_);
+    productive_.clear();
+    notes_void_ = false;  // out of order here
+    for (auto it = before_.rbegin(); it != before_.rend(); ++it) {
+      const std::int32_t line = it->strip * kLeastLines;
+      const std::int32_t first = fan_.line_step > 0 ? line - line_ : line_ - line - kLeastLines + 1;
+      if (first <= near || first > reach_) continue;
+      const std::int32_t last = std::min(first + kLeastLines - 1, reach_);
+      const unsigned raised = cross_lines(first, last, it->groups);
+      if (raised != 0) productive_.push_back({it->strip, raised});
+      // Where there is void, lines are crossed once more in their order.
+      if (!ground_.has_void()) crossed_.push_back(*it);
+    }
+    notes_void_ = ground_.has_void();
+  }
+
+  /// Some lines at growing distances, for the same. They are lines that the neighbouring bundles
+  /// cross too, where they can be.
   void cross_some(std::int32_t first) {
     notes_void_ = false;  // out of order here
     for (std::int32_t k = first; k <= reach_;) {
@@ -152,18 +221,18 @@ class BundleMarch {
       const std::int32_t step = std::max(k / kDistanceInSteps, 2);
       const int level = std::bit_width(static_cast<unsigned>(step)) - 1;
       k += 1 << level;
-      while (k <= reach_ && !begins_block(k, level)) ++k;
+      while (k <= reach_ && !begins_strip(k, level)) ++k;
     }
     flush(kAllGroups);
     notes_void_ = ground_.has_void();
   }
 
-  void list_squares(std::int32_t first) {
+  void list_spans(std::int32_t first) {
     spans_.clear();
     int level = MarchGround::kLeastLevel;
     for (std::int32_t k = first; k <= reach_;) {
-      while (level < ground_.greatest_level() && (kDistanceInSquares << (level + 1)) <= k &&
-             begins_block(k, level + 1))
+      while (level < ground_.greatest_level() && (kDistanceInStrips << (level + 1)) <= k &&
+             begins_strip(k, level + 1))
         ++level;
       const Span span{level, line_at(k) >> level, k, std::min(k + (1 << level) - 1, reach_)};
       const double at = place(k), end = at + place_step(k) * (kBundle - 1);
@@ -175,17 +244,46 @@ class BundleMarch {
     }
   }
 
+  /// All at once. Requires ground without void.
+  void search_spans() {
+    squares_.clear();
+    asked_.clear();
+    open_.clear();
+    for (const Span& span : spans_) {
+      Square square;
+      if (!make_square(span, square)) continue;
+      if (square.count > 0) {
+        squares_.push_back(square);
+        asked_.push_back(span);
+      } else {
+        open_span(span, kAllGroups);
+      }
+    }
+    open_.resize(squares_.size());
+    may_block(squares_.data(), squares_.size(), search_.tolerance, kAllGroups, *rays_,
+              open_.data());
+    for (std::size_t i = 0; i < asked_.size(); ++i)
+      if (open_[i] != 0) open_span(asked_[i], open_[i]);
+  }
+
   void search_span(const Span& span, unsigned groups) {
     Square square;
     unsigned open = groups;
     if (!make_square(span, square)) return;
     if (square.count > 0) {
-      open = may_block(square, search_.tolerance, groups, *rays_);
+      may_block(&square, 1, search_.tolerance, groups, *rays_, &open);
       if (ground_.has_void()) open |= note_void_of(span, square, groups & ~open);
     }
-    if (open == 0) return;
+    if (open != 0) open_span(span, open);
+  }
+
+  void open_span(const Span& span, unsigned open) {
     if (span.level == MarchGround::kLeastLevel) {
-      cross_lines(span.first, span.last, open);
+      for (const StripGroups& crossed : crossed_)
+        if (crossed.strip == span.strip) open &= ~crossed.groups;
+      if (open == 0) return;
+      const unsigned raised = cross_lines(span.first, span.last, open);
+      if (raised != 0) productive_.push_back({span.strip, raised});
       return;
     }
     const std::int32_t middle = span.first + (1 << (span.level - 1));
@@ -196,47 +294,40 @@ class BundleMarch {
     if (middle <= span.last) part(middle, span.last);
   }
 
-  /// The squares that hold all that the rays can meet within a span. Count 0: too many of them.
+  /// The highest ground that the rays can meet within a span. Count 0: it is not known.
   /// @return false where the rays meet nothing there
   bool make_square(const Span& span, Square& square) const {
-    const std::int32_t before = span.first - 1, after = std::min(span.last + 1, fan_.reach());
-    const LaneRange &from = lanes_at(before), &to = lanes_at(after);
-    const double half = (after - before) / 2.0, bulge = fan_.bulge * half * half;
-    const std::int32_t more = bulge <= kWindowMargin ? 0 : static_cast<std::int32_t>(bulge) + 1;
-    const std::int32_t first = std::min(from.first, to.first) - more;
-    const std::int32_t last = std::max(from.last, to.last) + more;
+    const StripLean& lean = ground_.leaning();
+    const bool squares = lean.are_squares;
+    const double lean_lanes = squares ? 0 : lean.lanes_per_line * (span.last - span.first);
+    const double from = place(span.first), from_end = from + place_step(span.first) * (kBundle - 1);
+    const double to = place(span.last), to_end = to + place_step(span.last) * (kBundle - 1);
+    const double half = (span.last - span.first) / 2.0;
+    // Samples on both sides of a ray, and those between its crossings with this line and the next.
+    const double margin = std::max(1.0, most_along_) + slack(span.last) +
+                          fan_.bulge * half * half + kWindowMargin;
     square.count = 0;
     square.inverse_near = static_cast<float>(inverse_run(span.first));
     square.inverse_far = static_cast<float>(inverse_run(span.last));
-    if (lane_ + last + kBundle < 0 || lane_ + first > ground_.lanes() - 1) return false;
-    const std::int32_t side = 1 << span.level;
-    const float* highest = ground_.highest(span.level, span.block);
+    if (lane_ + std::max({from, from_end, to, to_end}) + margin + kBundle < 0 ||
+        lane_ + std::min({from, from_end, to, to_end}) - margin > ground_.lanes() - 1)
+      return false;
+    if (!squares && lean.line_step != fan_.line_step) return true;
+    const double first = std::min({from, from_end, to - lean_lanes, to_end - lean_lanes}) - margin;
+    const double last = std::max({from, from_end, to - lean_lanes, to_end - lean_lanes}) + margin;
+    const float* highest = ground_.highest(span.level, span.strip);
+    const std::int32_t width = ground_.width(span.level);
+    const auto after = static_cast<std::int32_t>(std::floor(last)) - width;
     int count = 0;
-    for (std::int32_t at = clamped(first);;) {
-      if (count == kMostSquares) return true;
-      square.highest[count++] = highest + lane_ + at;
-      if (at + side > last) break;
-      at = std::min(at + side, std::max(clamped(last - side + 1), at + 1));
+    for (auto at = static_cast<std::int32_t>(std::floor(first));;) {
+      const std::int32_t read = squares ? clamped(at) : at;
+      if (count == kMostSquares || read != clamped(read)) return true;
+      square.highest[count++] = highest + lane_ + read;
+      if (squares ? at >= after : at + width >= last) break;
+      at += squares ? width + 1 : width;
     }
     square.count = count;
     return true;
-  }
-
-  /// Samples on either side of all places where the rays cross a line, from the bundle's first
-  /// ray's, with kWindowMargin to spare.
-  struct LaneRange {
-    std::int32_t stripe = 0;
-    std::int32_t first = 0, last = 0;
-  };
-  const LaneRange& lanes_at(std::int32_t k) const {
-    LaneRange& range = lane_ranges_[static_cast<std::size_t>(k)];
-    if (range.stripe == stripe_) return range;
-    const double at = place(k), end = at + place_step(k) * (kBundle - 1);
-    const double margin = slack(k) + kWindowMargin;
-    range.stripe = stripe_;
-    range.first = static_cast<std::int32_t>(std::floor(std::min(at, end) - margin));
-    range.last = static_cast<std::int32_t>(std::floor(std::max(at, end) + margin)) + 1;
-    return range;
   }
 
   /// Lane offsets at which a bundle can be read.
@@ -248,8 +339,8 @@ class BundleMarch {
   /// Groups, of those that are not opened anyway, that must be because there is void.
   unsigned note_void_of(const Span& span, const Square& square, unsigned groups) {
     unsigned open = 0;
-    const std::uint8_t* any_void = ground_.any_void(span.level, span.block);
-    const float* highest = ground_.highest(span.level, span.block);
+    const std::uint8_t* any_void = ground_.any_void(span.level, span.strip);
+    const float* highest = ground_.highest(span.level, span.strip);
     for (int g = 0; g < kGroups; ++g) {
       bool found = false;
       for (int i = 0; i < square.count; ++i)
@@ -262,13 +353,16 @@ class BundleMarch {
   }
 
   /// Crosses lines and what lies between them and their neighbours.
-  void cross_lines(std::int32_t first, std::int32_t last, unsigned groups) {
+  /// @return the groups of which a ray's low bound rose
+  unsigned cross_lines(std::int32_t first, std::int32_t last, unsigned groups) {
+    raised_ = 0;
     for (std::int32_t k = first; k <= last; ++k) {
       cross_between(k, groups);
       cross_line(k, groups);
     }
     if (last < reach_) cross_between(last + 1, groups);
     flush(groups);
+    return raised_;
   }
 
   /// Crossings that all rays of a bundle have for certain, alike for the bundles of a stripe but
@@ -347,7 +441,7 @@ class BundleMarch {
                                  static_cast<float>(step),
                                  static_cast<float>(reach),
                                  static_cast<float>(inverse_run(k))};
-    meet_loosely(crossing, *rays_);
+    raised_ |= meet_loosely(crossing, *rays_);
     if (notes_void_) note_void_loosely(crossing, *rays_);
   }
 
@@ -465,10 +559,9 @@ class BundleMarch {
     if (count_ == crossings_.size()) flush(groups);
   }
   void flush(unsigned groups) {
-    if (search_.measures_distance)
-      meet_and_measure(crossings_.data(), count_, 0, groups, *rays_);
-    else
-      meet(crossings_.data(), count_, 0, groups, *rays_);
+    double slack = 0;
+    for (std::size_t i = 0; i < count_; ++i) slack = std::max(slack, double{crossings_[i].slack});
+    raised_ |= meet(crossings_.data(), count_, 0, groups, notes_for(slack), *rays_);
     count_ = 0;
   }
   void add_possible(const PossibleCrossing& crossing, unsigned groups) {
@@ -477,6 +570,7 @@ class BundleMarch {
   }
 
   static constexpr int kMostSquares = 8;
+  static constexpr std::int32_t kLeastLines = 1 << MarchGround::kLeastLevel;
   static constexpr double kSwerveLanes = 64;
   static constexpr double kSureReach = 0.05;
   static constexpr double kWindowMargin = 1e-3;  ///< lanes
@@ -493,13 +587,21 @@ class BundleMarch {
   std::int32_t stripe_ = 0;
   double drift_ = 0;
   std::vector<Step> steps_;  ///< by line crossed
-  mutable std::vector<LaneRange> lane_ranges_;
+  double most_along_;
   std::int32_t first_line_ = 0;
   std::vector<Crossing> near_;         ///< of the stripe's first line
   std::vector<std::size_t> near_end_;  ///< in near_, by line crossed
+  std::vector<double> near_slack_;     ///< the greatest up to a line, of those not measured
   std::vector<std::int32_t> unsure_;   ///< lines crossed that near_ does not have whole
   RayBundle* rays_ = nullptr;
-  std::vector<Span> spans_;
+  std::vector<Span> spans_, asked_;
+  std::vector<Square> squares_;  ///< of asked_
+  std::vector<unsigned> open_;   ///< likewise
+  bool knows_strips_ = false;
+  std::vector<StripGroups> productive_, before_;  ///< that raised low bounds; of the bundle before
+  std::vector<StripGroups> crossed_;              ///< already, in this bundle
+  double least_error_ = 0;
+  unsigned raised_ = 0;
   std::array<Crossing, 64> crossings_;
   std::size_t count_ = 0;
   bool notes_void_ = false;
@@ -529,8 +631,9 @@ void place_eyes(const GroundGrid& grid, const MarchGround& ground, std::int32_t 
 
 /// Of the bundle whose first lane is the tile's i-th.
 void write_elevations(const MarchGround& ground, const RayFan& fan, const MarchTile& tile,
-                      std::int32_t i, std::int32_t line, const RayBundle& rays, double drift,
-                      const MarchSearch& search, TileHorizons& horizons) {
+                      std::int32_t i, std::int32_t line, const RayBundle& rays,
+                      const BundleMarch& march, const MarchSearch& search,
+                      TileHorizons& horizons) {
   const double p = i - (tile.lanes - 1) / 2.0;
   const double q = line - tile.first_line - (tile.lines - 1) / 2.0;
   const double z_m = ground.middle_z_m() - fan.middle_z_m;
@@ -547,7 +650,8 @@ void write_elevations(const MarchGround& ground, const RayFan& fan, const MarchT
                          static_cast<float>(-fan.stretch.per_lane * shrink * shrink),
                          static_cast<float>(fan.tangent_error),
                          static_cast<float>(4 * ground.rounding_m() * nearest),
-                         static_cast<float>(drift)};
+                         static_cast<float>(march.least_error()),
+                         static_cast<float>(march.drift())};
   std::array<std::int16_t, kBundle> estimate, lower, upper;
   elevations(row, rays, estimate.data(), lower.data(), upper.data());
   const auto count = static_cast<std::ptrdiff_t>(std::min(kBundle, tile.lanes - i));
@@ -583,7 +687,7 @@ void march_tile(const GroundGrid& grid, const MarchGround& ground, const RayFan&
       for (std::int32_t line = stripe; line < stripe_end; ++line) {
         place_eyes(grid, ground, tile.first_lane + i, line, search.eye_height_m, rays);
         march.run(line, rays);
-        write_elevations(ground, fan, tile, i, line, rays, march.drift(), search, horizons);
+        write_elevations(ground, fan, tile, i, line, rays, march, search, horizons);
       }
     }
   }

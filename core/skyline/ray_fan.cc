@@ -377,13 +377,18 @@ class FanMaker {
 
 }  // namespace
 
+Course course_of(const GroundGrid& grid, const std::optional<EarthFrame>& earth, March march,
+                 double lane, double line, const AzimuthAt& azimuth) {
+  const PlanMap map(grid, march);
+  const auto course = PlanRay(map, earth, lane, line, azimuth).course(map);
+  return {course[0] / std::abs(course[1]), course[1] < 0 ? -1 : 1};
+}
+
 double runs_along(const GroundGrid& grid, const std::optional<EarthFrame>& earth, March march,
                   const MarchTile& tile, const AzimuthAt& azimuth) {
-  const PlanMap map(grid, march);
-  const PlanRay ray(map, earth, tile.first_lane + (tile.lanes - 1) / 2.0,
-                    tile.first_line + (tile.lines - 1) / 2.0, azimuth);
-  const auto course = ray.course(map);
-  return std::abs(course[0] / course[1]);
+  return std::abs(course_of(grid, earth, march, tile.first_lane + (tile.lanes - 1) / 2.0,
+                            tile.first_line + (tile.lines - 1) / 2.0, azimuth)
+                      .lanes_per_line);
 }
 
 double greatest_tilt(const GroundGrid& grid) {

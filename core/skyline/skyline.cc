@@ -45,6 +45,30 @@ void copy_apart(const std::int16_t* from, std::size_t step, std::size_t count, s
   for (std::size_t i = 0; i < count; ++i) to[i] = from[i * step];
 }
 
+/// How strips lean best for rays from everywhere.
+StripLean strip_lean(const GroundGrid& grid, const std::optional<EarthFrame>& earth, March march,
+                     const AzimuthAt& azimuth) {
+  /// Rays that run so much apart find squares no worse.
+  constexpr double kMostApart = 0.1;
+  const bool rows = march == March::kOverRows;
+  const double lanes = (rows ? grid.columns() : grid.rows()) - 1;
+  const double lines = (rows ? grid.rows() : grid.columns()) - 1;
+  double least = std::numeric_limits<double>::infinity(), most = -least;
+  int forwards = 0, places = 0;
+  for (const double x : {0.0, 0.25, 0.5, 0.75, 1.0}) {
+    for (const double y : {0.0, 0.25, 0.5, 0.75, 1.0}) {
+      const Course course = course_of(grid, earth, march, x * lanes, y * lines, azimuth);
+      least = std::min(least, course.lanes_per_line);
+      most = std::max(most, course.lanes_per_line);
+      forwards += course.line_step > 0 ? 1 : 0;
+      ++places;
+    }
+  }
+  StripLean lean;
+  if (most - least > kMostApart || (forwards != 0 && forwards != places)) return lean;
+  return {false, forwards > 0 ? 1 : -1, (least + most) / 2};
+}
+
 /// The same cells in columns and rows, or back.
 MarchTile turned(const MarchTile& tile) {
   return {tile.first_line, tile.lines, tile.first_lane, tile.lanes};
@@ -79,9 +103,10 @@ March Skyline::march_for(const AzimuthAt& azimuth) const {
                                                                           : March::kOverColumns;
 }
 
-const MarchGround& Skyline::ground_for(March march) {
+const MarchGround& Skyline::ground_for(March march, const AzimuthAt& azimuth) {
   std::unique_ptr<MarchGround>& ground = march == March::kOverRows ? over_rows_ : over_columns_;
   if (!ground) ground = std::make_unique<MarchGround>(grid_, march);
+  ground->lean(strip_lean(grid_, earth_, march, azimuth));
   return *ground;
 }
 
@@ -113,10 +138,9 @@ void Skyline::look(const AzimuthAt& azimuth, const SkylineBands& bands) {
                                     [&](const Part& part) { return part.march != preferred; });
   // One layout at a time, where that is enough.
   if (!is_mixed) (preferred == March::kOverRows ? over_columns_ : over_rows_).reset();
-  const MarchGround& ground = ground_for(preferred);
-  const MarchGround& other =
-      is_mixed ? ground_for(preferred == March::kOverRows ? March::kOverColumns : March::kOverRows)
-               : ground;
+  const MarchGround& ground = ground_for(preferred, azimuth);
+  const March second = preferred == March::kOverRows ? March::kOverColumns : March::kOverRows;
+  const MarchGround& other = is_mixed ? ground_for(second, azimuth) : ground;
   parallel_for(parts.size(), [&](std::size_t i) {
     look_from(parts[i], parts[i].march == preferred ? ground : other, azimuth, bands);
   });

@@ -49,7 +49,7 @@ class Skyline {
 
  private:
   struct Part;
-  const MarchGround& ground_for(March march);
+  const MarchGround& ground_for(March march, const AzimuthAt& azimuth);
   std::vector<Part> parts_for(March preferred, const AzimuthAt& azimuth) const;
   void look_from(const Part& part, const MarchGround& ground, const AzimuthAt& azimuth,
                  const SkylineBands& bands) const;
