@@ -4,7 +4,7 @@
 // After foreach_target.h, which includes this file once more for each instruction set.
 #include <hwy/highway.h>
 
-#include <algorithm>
+#include <bit>
 
 #include "core/skyline/crossing_kernels.h"
 #include "core/skyline/march_ground.h"
@@ -39,8 +39,11 @@ template <bool kError, bool kDistance, bool kFans>
 HWY_INLINE unsigned meet_noting(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift,
                                 unsigned groups, RayBundle& rays) {
   unsigned raised = 0;
-  for (std::size_t ray = 0; ray < kBundle; ray += hn::Lanes(kTag)) {
-    if (!takes_part(groups, ray)) continue;
+  const std::size_t lanes = hn::Lanes(kTag), parts = kGroup / lanes;
+  for (std::size_t part = 0; groups != 0; part = part + 1 == parts ? 0 : part + 1) {
+    const std::size_t ray =
+        static_cast<std::size_t>(std::countr_zero(groups)) * kGroup + part * lanes;
+    if (part + 1 == parts) groups &= groups - 1;
     const Vector before = hn::Load(kTag, rays.slope + ray);
     const Vector eye = hn::Load(kTag, rays.eye_z + ray);
     const Vector number = hn::Iota(kTag, static_cast<float>(ray));
@@ -70,12 +73,12 @@ HWY_INLINE unsigned meet_noting(const Crossing* crossings, std::size_t count, st
 }
 
 unsigned meet_now(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift,
-                  unsigned groups, const MeetNotes& notes, bool fans, RayBundle& rays) {
+                  unsigned groups, const MeetNotes& notes, RayBundle& rays) {
   if (notes.distance) return meet_noting<true, true, true>(crossings, count, shift, groups, rays);
   if (notes.error)
-    return fans ? meet_noting<true, false, true>(crossings, count, shift, groups, rays)
+    return notes.fans ? meet_noting<true, false, true>(crossings, count, shift, groups, rays)
                 : meet_noting<true, false, false>(crossings, count, shift, groups, rays);
-  return fans ? meet_noting<false, false, true>(crossings, count, shift, groups, rays)
+  return notes.fans ? meet_noting<false, false, true>(crossings, count, shift, groups, rays)
               : meet_noting<false, false, false>(crossings, count, shift, groups, rays);
 }
 
@@ -147,6 +150,9 @@ unsigned meet_loosely_now(const LooseCrossing& c, RayBundle& rays) {
   return raised;
 }
 
+/// What is left out of groups that stay closed, and that are opened.
+constexpr float kMostRest[] = {1e30F, -1e30F};
+
 /// The steepest that rays can see the ground of a square.
 HWY_INLINE Vector steepest(const Square& square, std::size_t ray, Vector eye) {
   Vector most = hn::LoadU(kTag, square.highest[0] + ray);
@@ -160,8 +166,8 @@ void may_block_now(const Square* squares, std::size_t count, float tolerance, un
                    RayBundle& rays, unsigned* open) {
   for (std::size_t i = 0; i < count; ++i) open[i] = 0;
   const std::size_t lanes = hn::Lanes(kTag);
-  for (std::size_t first = 0; first < kBundle; first += kGroup) {
-    if (!takes_part(groups, first)) continue;
+  for (; groups != 0; groups &= groups - 1) {
+    const std::size_t first = static_cast<std::size_t>(std::countr_zero(groups)) * kGroup;
     for (std::size_t i = 0; i < count; ++i) {
       bool is_open = false;
       for (std::size_t ray = first; ray < first + kGroup; ray += lanes) {
@@ -170,15 +176,14 @@ void may_block_now(const Square* squares, std::size_t count, float tolerance, un
         const Vector least = hn::Max(met + value(tolerance), value(RayBundle::kNone));
         const Vector slope = steepest(squares[i], ray, hn::Load(kTag, rays.eye_z + ray));
         is_open = is_open || !hn::AllFalse(kTag, slope > least);
-        // In one vector a group is decided at once.
-        if (lanes == kGroup && !is_open)
-          hn::Store(hn::Max(hn::Load(kTag, rays.rest + ray), slope), kTag, rays.rest + ray);
+        // In one vector a group is decided at once, and without a branch.
+        if (lanes == kGroup)
+          hn::Store(hn::Max(hn::Load(kTag, rays.rest + ray),
+                            hn::Min(slope, value(kMostRest[is_open ? 1 : 0]))),
+                    kTag, rays.rest + ray);
       }
-      if (is_open) {
-        open[i] |= 1U << (first / kGroup);
-        continue;
-      }
-      if (lanes == kGroup) continue;
+      open[i] |= (is_open ? 1U : 0U) << (first / kGroup);
+      if (lanes == kGroup || is_open) continue;
       for (std::size_t ray = first; ray < first + kGroup; ray += lanes) {
         const Vector slope = steepest(squares[i], ray, hn::Load(kTag, rays.eye_z + ray));
         hn::Store(hn::Max(hn::Load(kTag, rays.rest + ray), slope), kTag, rays.rest + ray);
@@ -325,10 +330,7 @@ HWY_EXPORT(note_ground_behind_now);
 
 unsigned meet(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift, unsigned groups,
               const MeetNotes& notes, RayBundle& rays) {
-  const bool fans = std::any_of(crossings, crossings + count, [](const Crossing& c) {
-    return c.share_step != 0 || c.inverse_run_step != 0;
-  });
-  return HWY_DYNAMIC_DISPATCH(meet_now)(crossings, count, shift, groups, notes, fans, rays);
+  return HWY_DYNAMIC_DISPATCH(meet_now)(crossings, count, shift, groups, notes, rays);
 }
 
 void meet_high(const PossibleCrossing& crossing, unsigned groups, RayBundle& rays) {

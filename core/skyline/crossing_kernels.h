@@ -45,6 +45,7 @@ struct Crossing {
 struct MeetNotes {
   bool error = true;      ///< raises `error`; else the caller knows a bound of it
   bool distance = false;  ///< notes slope_run
+  bool fans = true;       ///< places or runs differ from ray to ray
 };
 
 /// Compares rays with segments.

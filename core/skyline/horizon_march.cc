@@ -41,7 +41,8 @@ class BundleMarch {
         search_(search),
         exact_(fan.slack_fixed == 0 && fan.slack_rate == 0),
         steps_(fan.place.size()),
-        most_along_(most_along()) {}
+        most_along_(most_along()),
+        fans_(fan.turn.per_lane != 0) {}
 
   /// Lines of cells that share the places of their crossings: so many that these are off by
   /// kStripeSlack at most.
@@ -72,9 +73,10 @@ class BundleMarch {
     ++stripe_;
     drift_ = 0;
     first_line_ = first_line;
-    near_.clear();
-    near_end_.assign(1, 0);
-    near_slack_.assign(1, 0);
+    sure_.clear();
+    sure_end_.assign(1, 0);
+    between_end_.assign(1, 0);
+    slack_up_to_.assign(1, 0);
     unsure_.clear();
   }
 
@@ -87,10 +89,7 @@ class BundleMarch {
     notes_void_ = ground_.has_void();
     const std::int32_t near = last_near_line();
     least_error_ = 0;
-    if (notes_void_)
-      cross_lines(1, near, kAllGroups);
-    else
-      cross_near(near);
+    cross_lines(1, near, kAllGroups);
     crossed_.clear();
     if (knows_strips_)
       cross_productive(near);
@@ -150,46 +149,66 @@ class BundleMarch {
     return (line & ((1 << level) - 1)) == 0;
   }
 
-  /// The first lines, at once for all that all bundles of the stripe have alike.
-  void cross_near(std::int32_t near) {
-    const std::int32_t last = std::min(near + 1, reach_);
-    for (auto k = static_cast<std::int32_t>(near_end_.size()); k <= last; ++k) {
+  /// Makes lists of the crossings up to the k-th line that all rays of the stripe have alike, but
+  /// for the lines' numbers: between the lines before and it, then with it.
+  void list_crossings(std::int32_t last) {
+    for (auto k = static_cast<std::int32_t>(sure_end_.size()); k <= last; ++k) {
       const Step& step = step_at(k);
       const std::ptrdiff_t shift = (first_line_ - step.line) * ground_.stride();
-      double slack = near_slack_.back();
+      double slack = slack_up_to_.back();
       const auto keep = [&](const Crossing& crossing) {
         if (k > kMeasuredLines) slack = std::max(slack, double{crossing.slack});
-        near_.push_back(crossing);
-        near_.back().a += shift;
-        near_.back().b += shift;
+        sure_.push_back(crossing);
+        sure_.back().a += shift;
+        sure_.back().b += shift;
       };
       if (step.is_between_sure) std::for_each_n(step.between.begin(), step.betweens, keep);
+      between_end_.push_back(sure_.size());
       if (step.is_line_sure) keep(step.at_line);
       if (!step.is_between_sure || !step.is_line_sure) unsure_.push_back(k);
-      near_end_.push_back(near_.size());
-      near_slack_.push_back(slack);
+      sure_end_.push_back(sure_.size());
+      slack_up_to_.push_back(slack);
     }
-    const std::size_t count = near_end_[static_cast<std::size_t>(last)];
+  }
+
+  /// Crosses lines and what lies between them and their neighbours.
+  /// @return the groups of which a ray's low bound rose
+  unsigned cross_lines(std::int32_t first, std::int32_t last, unsigned groups) {
+    raised_ = 0;
+    if (notes_void_) {
+      cross_in_order(first, last, groups);
+      return raised_;
+    }
+    const std::int32_t after = std::min(last + 1, reach_);
+    list_crossings(after);
+    const auto index = [](std::int32_t k) { return static_cast<std::size_t>(k); };
+    const std::size_t end = after > last ? between_end_[index(after)] : sure_end_[index(last)];
     const std::ptrdiff_t shift = (line_ - first_line_) * ground_.stride();
-    const std::size_t measured = near_end_[static_cast<std::size_t>(std::min(kMeasuredLines, last))];
-    const MeetNotes notes{true, search_.measures_distance};
-    meet(near_.data(), measured, shift, kAllGroups, notes, *rays_);
-    meet(near_.data() + measured, count - measured, shift, kAllGroups,
-         notes_for(near_slack_[static_cast<std::size_t>(last)]), *rays_);
-    for (const std::int32_t k : unsure_) {
-      if (k > last) break;
-      const Step& step = step_at(k);
-      if (!step.is_between_sure) cross_between(k, kAllGroups);
-      if (!step.is_line_sure) cross_line(k, kAllGroups);
+    std::size_t from = sure_end_[index(first - 1)];
+    const auto meet_up_to = [&](std::size_t to, const MeetNotes& notes) {
+      raised_ |= meet(&sure_[from], to - from, shift, groups, notes, *rays_);
+      from = to;
+    };
+    if (first <= kMeasuredLines)
+      meet_up_to(std::min(end, sure_end_[index(std::min(kMeasuredLines, last))]),
+                 {true, search_.measures_distance, fans_});
+    meet_up_to(end, notes_for(slack_up_to_[index(after)]));
+    for (auto it = std::lower_bound(unsure_.begin(), unsure_.end(), first);
+         it != unsure_.end() && *it <= after; ++it) {
+      const Step& step = step_at(*it);
+      if (!step.is_between_sure) cross_between(*it, groups);
+      if (!step.is_line_sure && *it <= last) cross_line(*it, groups);
     }
+    flush(groups);
+    return raised_;
   }
 
   /// What to measure of crossings with slacks up to this.
   MeetNotes notes_for(double slack) {
     const double error = slack * ground_.steepest_m();
-    if (error > kCheapError) return {true, search_.measures_distance};
-    least_error_ = std::max(least_error_, error);
-    return {false, search_.measures_distance};
+    const bool is_cheap = error <= kCheapError;
+    if (is_cheap) least_error_ = std::max(least_error_, error);
+    return {!is_cheap, search_.measures_distance, fans_};
   }
 
   /// Strips in which rays of the bundle before this one met their horizons, so that low bounds are
@@ -286,12 +305,30 @@ class BundleMarch {
       if (raised != 0) productive_.push_back({span.strip, raised});
       return;
     }
-    const std::int32_t middle = span.first + (1 << (span.level - 1));
-    const auto part = [&](std::int32_t first, std::int32_t last) {
-      search_span({span.level - 1, line_at(first) >> (span.level - 1), first, last}, open);
-    };
-    part(span.first, std::min(span.last, middle - 1));
-    if (middle <= span.last) part(middle, span.last);
+    const int level = span.level - 1;
+    const std::int32_t middle = std::min(span.first + (1 << level), span.last + 1);
+    const Span near{level, line_at(span.first) >> level, span.first, middle - 1};
+    if (middle > span.last) {
+      search_span(near, open);
+      return;
+    }
+    const Span far{level, line_at(middle) >> level, middle, span.last};
+    if (notes_void_) {
+      search_span(near, open);
+      search_span(far, open);
+      return;
+    }
+    std::array<Square, 2> squares;
+    const bool is_near = make_square(near, squares[0]), is_far = make_square(far, squares[1]);
+    if (!is_near || !is_far || squares[0].count == 0 || squares[1].count == 0) {
+      if (is_near) search_span(near, open);
+      if (is_far) search_span(far, open);
+      return;
+    }
+    std::array<unsigned, 2> parts;
+    may_block(squares.data(), 2, search_.tolerance, open, *rays_, parts.data());
+    if (parts[0] != 0) open_span(near, parts[0]);
+    if (parts[1] != 0) open_span(far, parts[1]);
   }
 
   /// The highest ground that the rays can meet within a span. Count 0: it is not known.
@@ -302,7 +339,7 @@ class BundleMarch {
     const double lean_lanes = squares ? 0 : lean.lanes_per_line * (span.last - span.first);
     const double from = place(span.first), from_end = from + place_step(span.first) * (kBundle - 1);
     const double to = place(span.last), to_end = to + place_step(span.last) * (kBundle - 1);
-    const double half = (span.last - span.first) / 2.0;
+    const double half = (1 << span.level) / 2.0;
     // Samples on both sides of a ray, and those between its crossings with this line and the next.
     const double margin = std::max(1.0, most_along_) + slack(span.last) +
                           fan_.bulge * half * half + kWindowMargin;
@@ -352,17 +389,14 @@ class BundleMarch {
     return open;
   }
 
-  /// Crosses lines and what lies between them and their neighbours.
-  /// @return the groups of which a ray's low bound rose
-  unsigned cross_lines(std::int32_t first, std::int32_t last, unsigned groups) {
-    raised_ = 0;
+  /// The same, in the order of the rays.
+  void cross_in_order(std::int32_t first, std::int32_t last, unsigned groups) {
     for (std::int32_t k = first; k <= last; ++k) {
       cross_between(k, groups);
       cross_line(k, groups);
     }
     if (last < reach_) cross_between(last + 1, groups);
     flush(groups);
-    return raised_;
   }
 
   /// Crossings that all rays of a bundle have for certain, alike for the bundles of a stripe but
@@ -559,6 +593,7 @@ class BundleMarch {
     if (count_ == crossings_.size()) flush(groups);
   }
   void flush(unsigned groups) {
+    if (count_ == 0) return;
     double slack = 0;
     for (std::size_t i = 0; i < count_; ++i) slack = std::max(slack, double{crossings_[i].slack});
     raised_ |= meet(crossings_.data(), count_, 0, groups, notes_for(slack), *rays_);
@@ -574,8 +609,8 @@ class BundleMarch {
   static constexpr double kSwerveLanes = 64;
   static constexpr double kSureReach = 0.05;
   static constexpr double kWindowMargin = 1e-3;  ///< lanes
-  static constexpr std::int32_t kMostStripeLines = 16;
-  static constexpr double kStripeSlack = 4e-5;  ///< lanes per line crossed
+  static constexpr std::int32_t kMostStripeLines = 256;
+  static constexpr double kStripeSlack = 1e-4;  ///< lanes per line crossed
 
   const MarchGround& ground_;
   const RayFan& fan_;
@@ -588,11 +623,13 @@ class BundleMarch {
   double drift_ = 0;
   std::vector<Step> steps_;  ///< by line crossed
   double most_along_;
+  bool fans_;  ///< places differ from ray to ray
   std::int32_t first_line_ = 0;
-  std::vector<Crossing> near_;         ///< of the stripe's first line
-  std::vector<std::size_t> near_end_;  ///< in near_, by line crossed
-  std::vector<double> near_slack_;     ///< the greatest up to a line, of those not measured
-  std::vector<std::int32_t> unsure_;   ///< lines crossed that near_ does not have whole
+  std::vector<Crossing> sure_;  ///< of the stripe's first line
+  /// In sure_, by line crossed: after what lies between it and the one before, and after it.
+  std::vector<std::size_t> between_end_, sure_end_;
+  std::vector<double> slack_up_to_;   ///< the greatest of those not measured, by line crossed
+  std::vector<std::int32_t> unsure_;  ///< lines crossed that sure_ does not have whole
   RayBundle* rays_ = nullptr;
   std::vector<Span> spans_, asked_;
   std::vector<Square> squares_;  ///< of asked_

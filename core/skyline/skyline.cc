@@ -21,7 +21,7 @@ constexpr double kStepRad = std::numbers::pi / 18'000;
 
 /// Tiles hold so many cells at most, and are so wide at most where cells are large, because what a
 /// fan takes for linear bends.
-constexpr std::int32_t kTileLanes = 256, kTileLines = 64;
+constexpr std::int32_t kTileLanes = 256, kTileLines = 256;
 constexpr double kTileSideM = 16'000;
 
 /// Rays of a tile may run so much along the lines before another layout is chosen: a little more
