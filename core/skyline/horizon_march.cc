@@ -655,7 +655,8 @@ void place_eyes(const GroundGrid& grid, const MarchGround& ground, std::int32_t 
       const bool rows = ground.march() == March::kOverRows;
       const double raised_z_m =
           grid.raised(rows ? lane + i : line, rows ? line : lane + i, height_m).z_m;
-      rays.eye_z[i] = static_cast<float>(raised_z_m - ground.middle_z_m());
+      const double above_m = raised_z_m - ground.middle_z_m();
+      rays.eye_z[i] = static_cast<float>(ground.is_upside_down() ? -above_m : above_m);
     }
     rays.low[i] = known ? MarchGround::kNothing : -MarchGround::kNothing;
     rays.slope[i] = rays.high[i] = rays.rest[i] = rays.low[i];
@@ -676,7 +677,7 @@ void write_elevations(const MarchGround& ground, const RayFan& fan, const MarchT
   const double z_m = ground.middle_z_m() - fan.middle_z_m;
   const double shrink = 1 / fan.stretch.at(p, q);
   const double nearest = fan.reach() > 0 ? fan.inverse_run[1] : 0;
-  const ElevationRow row{static_cast<float>(fan.level.at(p, q) + fan.level_z * z_m),
+  ElevationRow row{static_cast<float>(fan.level.at(p, q) + fan.level_z * z_m),
                          static_cast<float>(fan.level.per_lane),
                          static_cast<float>(fan.rise.at(p, q) + fan.rise_z * z_m),
                          static_cast<float>(fan.rise.per_lane),
@@ -689,6 +690,10 @@ void write_elevations(const MarchGround& ground, const RayFan& fan, const MarchT
                          static_cast<float>(4 * ground.rounding_m() * nearest),
                          static_cast<float>(march.least_error()),
                          static_cast<float>(march.drift())};
+  if (ground.is_upside_down()) {
+    // Slopes s and heights z are those of the ground times -1, and so shall tangents be.
+    for (float* part : {&row.level, &row.level_step, &row.rise_z, &row.bend}) *part = -*part;
+  }
   std::array<std::int16_t, kBundle> estimate, lower, upper;
   elevations(row, rays, estimate.data(), lower.data(), upper.data());
   const auto count = static_cast<std::ptrdiff_t>(std::min(kBundle, tile.lanes - i));

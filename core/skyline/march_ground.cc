@@ -71,7 +71,8 @@ void raise_to(std::size_t count, double least, double most, const Value* from, V
 
 }  // namespace
 
-MarchGround::MarchGround(const GroundGrid& grid, March march) : march_(march) {
+MarchGround::MarchGround(const GroundGrid& grid, March march, bool upside_down)
+    : march_(march), upside_down_(upside_down) {
   const bool rows = march == March::kOverRows;
   lines_ = rows ? grid.rows() : grid.columns();
   lanes_ = rows ? grid.columns() : grid.rows();
@@ -119,10 +120,11 @@ void MarchGround::read_heights(const GroundGrid& grid) {
   const double reach_m =
       static_cast<double>(std::max<std::int64_t>(most - middle, 0)) * kLatticeStepM;
   rounding_m_ = reach_m < 4095 ? 0 : reach_m * 0x1p-24;
+  const double sign = upside_down_ ? -1 : 1;
   const auto value = [&](std::int32_t step) {
     return step == GroundGrid::kVoid
                ? kVoid
-               : static_cast<float>(static_cast<double>(step - middle) * kLatticeStepM);
+               : static_cast<float>(static_cast<double>(step - middle) * kLatticeStepM * sign);
   };
   // Columns become lines in bands, so that what is read and what is written stay in the cache.
   constexpr std::int32_t kBand = 16;

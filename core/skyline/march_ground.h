@@ -30,7 +30,7 @@ struct StripLean {
 /// an azimuth do, so that they are little wider than a ray; where rays of one azimuth run too
 /// differently, strips are squares instead.
 ///
-/// Heights are flattened metres above middle_z_m, in float: exact below 4096 m, because lattice
+/// Heights are flattened metres above middle_z_m (below it upside down), in float: exact below 4096 m, because lattice
 /// steps are 2^-12 m, and otherwise within rounding_m.
 /// Memory: 5 bytes a sample; a quarter more where there is void.
 class MarchGround {
@@ -45,13 +45,15 @@ class MarchGround {
   static constexpr int kLeastLevel = 3;  ///< of strips: 8 lines
 
   /// Without strips.
-  MarchGround(const GroundGrid& grid, March march);
+  /// @param upside_down  heights are those of the ground times -1
+  MarchGround(const GroundGrid& grid, March march, bool upside_down = false);
 
   /// Makes strips, unless they lean so already. Cost: less than a nanosecond a sample.
   void lean(const StripLean& lean);
   const StripLean& leaning() const { return lean_; }
 
   March march() const { return march_; }
+  bool is_upside_down() const { return upside_down_; }
   std::int32_t lines() const { return lines_; }
   std::int32_t lanes() const { return lanes_; }
   double middle_z_m() const { return middle_z_m_; }
@@ -95,6 +97,7 @@ class MarchGround {
   static constexpr std::int32_t kLeaningWidth = 3;
 
   March march_;
+  bool upside_down_;
   std::int32_t lines_ = 0, lanes_ = 0;
   std::size_t stride_ = 0;
   double middle_z_m_ = 0, rounding_m_ = 0, steepest_m_ = 0;

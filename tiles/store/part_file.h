@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 
@@ -30,10 +31,13 @@ class PartFile {
 
   void append(std::span<const std::byte> bytes);
 
-  /// The part's own name, for a writer that wants one and may put a new file there; afterwards
-  /// take_over() makes what is there the part.
-  const std::string& part_path() const { return part_path_; }
-  void take_over();
+  /// Makes the part so long, and asks for room on the disk, so that too little shows before long
+  /// work. What is not written reads as zeros.
+  void reserve(std::uint64_t bytes);
+  /// Anywhere in the file, from several threads at once.
+  void write_at(std::uint64_t offset, std::span<const std::byte> bytes);
+  /// Has the system begin to move a stretch to the disk, so that commit() has less to wait for.
+  void begin_flush(std::uint64_t offset, std::uint64_t bytes);
 
   /// Flushes the file, renames it, flushes the folder. Once, as the last call.
   void commit();
