@@ -349,6 +349,7 @@ void may_block(const Square* squares, std::size_t count, float tolerance, unsign
 void elevations(const ElevationRow& row, const RayBundle& rays, std::int16_t* estimate,
                 std::int16_t* lower, std::int16_t* upper) {
   HWY_DYNAMIC_DISPATCH(elevations_now)(row, rays, estimate, lower, upper);
+  if (!row.has_unknown) return;
   for (int i = 0; i < kBundle; ++i)
     if (rays.void_before[i] > 0) estimate[i] = lower[i] = upper[i] = kUnknownElevation;
 }

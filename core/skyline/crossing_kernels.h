@@ -110,6 +110,7 @@ struct ElevationRow {
   float slope_error;          ///< of the heights' rounding
   float least_error;          ///< of crossings that were not measured
   float drift;                ///< relative error of the runs at certain crossings
+  bool has_unknown;           ///< some rays have no eye, or there is void
 };
 
 /// Elevation in steps of 0.01 degree from slopes, rounded down and up.

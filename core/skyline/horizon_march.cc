@@ -6,15 +6,22 @@
 #include <cmath>
 
 #include "core/skyline/crossing_kernels.h"
+#include "core/threads/for_each_target.h"
 
 namespace scarp {
 namespace {
 
 /// Lines that every ray crosses one by one; then strips take over.
-constexpr std::int32_t kNearLines = 16;
+#ifndef NEAR
+#define NEAR 16
+#endif
+constexpr std::int32_t kNearLines = NEAR;
 
 /// Strips are asked first as deep as this share of their distance.
-constexpr std::int32_t kDistanceInStrips = 2;
+#ifndef DIS
+#define DIS 2
+#endif
+constexpr std::int32_t kDistanceInStrips = DIS;
 
 /// Where nothing is known of the neighbours' horizons, lines this share of their distance apart are
 /// crossed beforehand.
@@ -337,21 +344,23 @@ class BundleMarch {
     const StripLean& lean = ground_.leaning();
     const bool squares = lean.are_squares;
     const double lean_lanes = squares ? 0 : lean.lanes_per_line * (span.last - span.first);
-    const double from = place(span.first), from_end = from + place_step(span.first) * (kBundle - 1);
-    const double to = place(span.last), to_end = to + place_step(span.last) * (kBundle - 1);
+    // Of the first ray, and of the last, where rays fan.
+    const double from = place(span.first), to = place(span.last) - lean_lanes;
+    const double fan = fans_ ? place_step(span.first) * (kBundle - 1) : 0;
+    const double end_fan = fans_ ? place_step(span.last) * (kBundle - 1) : 0;
     const double half = (1 << span.level) / 2.0;
     // Samples on both sides of a ray, and those between its crossings with this line and the next.
     const double margin = std::max(1.0, most_along_) + slack(span.last) +
                           fan_.bulge * half * half + kWindowMargin;
+    const double first = std::min(from + std::min(fan, 0.0), to + std::min(end_fan, 0.0)) - margin;
+    const double last = std::max(from + std::max(fan, 0.0), to + std::max(end_fan, 0.0)) + margin;
     square.count = 0;
     square.inverse_near = static_cast<float>(inverse_run(span.first));
     square.inverse_far = static_cast<float>(inverse_run(span.last));
-    if (lane_ + std::max({from, from_end, to, to_end}) + margin + kBundle < 0 ||
-        lane_ + std::min({from, from_end, to, to_end}) - margin > ground_.lanes() - 1)
+    if (lane_ + last + std::max(lean_lanes, 0.0) + kBundle < 0 ||
+        lane_ + first + std::min(lean_lanes, 0.0) > ground_.lanes() - 1)
       return false;
     if (!squares && lean.line_step != fan_.line_step) return true;
-    const double first = std::min({from, from_end, to - lean_lanes, to_end - lean_lanes}) - margin;
-    const double last = std::max({from, from_end, to - lean_lanes, to_end - lean_lanes}) + margin;
     const float* highest = ground_.highest(span.level, span.strip);
     const std::int32_t width = ground_.width(span.level);
     const auto after = static_cast<std::int32_t>(std::floor(last)) - width;
@@ -544,9 +553,9 @@ class BundleMarch {
           samples(k - 1, found.lane_offset),
           samples(k, found.lane_offset),
           static_cast<float>(found.at),
-          static_cast<float>((found.end - found.at) / (kBundle - 1)),
+          fans_ ? static_cast<float>((found.end - found.at) / (kBundle - 1)) : 0,
           static_cast<float>(inverse),
-          static_cast<float>((last_inverse - inverse) / (kBundle - 1)),
+          fans_ ? static_cast<float>((last_inverse - inverse) / (kBundle - 1)) : 0,
           static_cast<float>(found.reach * inverse)};
       to.drift = std::max(to.drift, found.reach / (k - 1 + least));
     });
@@ -644,26 +653,38 @@ class BundleMarch {
   bool notes_void_ = false;
 };
 
-/// Eyes over a line's samples; rays without one take no part.
+/// Rays begin at known samples; others take no part.
+SCARP_FOR_EACH_TARGET
+void begin_rays(const float* __restrict z, RayBundle& rays) {
+  for (int i = 0; i < kBundle; ++i) {
+    const bool known = MarchGround::is_ground(z[i]);
+    const float slope = known ? MarchGround::kNothing : -MarchGround::kNothing;
+    rays.eye_z[i] = known ? z[i] : 0;
+    rays.slope[i] = slope;
+    rays.low[i] = slope;
+    rays.high[i] = slope;
+    rays.rest[i] = slope;
+    rays.error[i] = 0;
+    rays.slope_run[i] = 0;
+    rays.run[i] = 0;
+    rays.over_void[i] = 0;
+    rays.void_before[i] = known ? 0 : 1;
+  }
+}
+
+/// Eyes over a line's samples.
 void place_eyes(const GroundGrid& grid, const MarchGround& ground, std::int32_t lane,
                 std::int32_t line, double height_m, RayBundle& rays) {
   const float* z = ground.line(line) + lane;
-  for (int i = 0; i < kBundle; ++i) {
-    const bool known = lane + i < ground.lanes() && MarchGround::is_ground(z[i]);
-    rays.eye_z[i] = known ? z[i] : 0;
-    if (known && height_m > 0) {
-      const bool rows = ground.march() == March::kOverRows;
-      const double raised_z_m =
-          grid.raised(rows ? lane + i : line, rows ? line : lane + i, height_m).z_m;
-      const double above_m = raised_z_m - ground.middle_z_m();
-      rays.eye_z[i] = static_cast<float>(ground.is_upside_down() ? -above_m : above_m);
-    }
-    rays.low[i] = known ? MarchGround::kNothing : -MarchGround::kNothing;
-    rays.slope[i] = rays.high[i] = rays.rest[i] = rays.low[i];
-    rays.error[i] = 0;
-    rays.slope_run[i] = rays.run[i] = 0;
-    rays.over_void[i] = 0;
-    rays.void_before[i] = known ? 0 : 1;
+  begin_rays(z, rays);
+  if (height_m <= 0) return;
+  const bool rows = ground.march() == March::kOverRows;
+  for (int i = 0; i < std::min(kBundle, ground.lanes() - lane); ++i) {
+    if (!MarchGround::is_ground(z[i])) continue;
+    const double raised_z_m =
+        grid.raised(rows ? lane + i : line, rows ? line : lane + i, height_m).z_m;
+    const double above_m = raised_z_m - ground.middle_z_m();
+    rays.eye_z[i] = static_cast<float>(ground.is_upside_down() ? -above_m : above_m);
   }
 }
 
@@ -689,7 +710,8 @@ void write_elevations(const MarchGround& ground, const RayFan& fan, const MarchT
                          static_cast<float>(fan.tangent_error),
                          static_cast<float>(4 * ground.rounding_m() * nearest),
                          static_cast<float>(march.least_error()),
-                         static_cast<float>(march.drift())};
+                         static_cast<float>(march.drift()),
+                         ground.has_void()};
   if (ground.is_upside_down()) {
     // Slopes s and heights z are those of the ground times -1, and so shall tangents be.
     for (float* part : {&row.level, &row.level_step, &row.rise_z, &row.bend}) *part = -*part;

@@ -42,7 +42,10 @@ class MarchGround {
 
   /// Lanes beyond either border that may be read: kNothing.
   static constexpr std::int32_t kPad = 272;
-  static constexpr int kLeastLevel = 3;  ///< of strips: 8 lines
+  #ifndef LEVEL
+#define LEVEL 3
+#endif
+  static constexpr int kLeastLevel = LEVEL;  ///< of strips: 8 lines
 
   /// Without strips.
   /// @param upside_down  heights are those of the ground times -1

@@ -243,6 +243,12 @@ class FanMaker {
     side((tile_.lanes - 1) / 2.0, 0, fan_.turn.per_lane, fan_.stretch.per_lane);
     side(0, (tile_.lines - 1) / 2.0, fan_.turn.per_line, fan_.stretch.per_line);
     if (is_exact()) fan_.turn = {};
+    // What rounding makes of parallel rays; what it matters is measured.
+    constexpr double kParallelLanes = 1e-6;
+    if (std::abs(fan_.turn.per_lane) * tile_.lanes * map_.lines() < kParallelLanes)
+      fan_.turn.per_lane = 0;
+    if (std::abs(fan_.turn.per_line) * tile_.lines * map_.lines() < kParallelLanes)
+      fan_.turn.per_line = 0;
   }
 
   /// Along a line of samples that all have the same x (or y) a ray keeps to it exactly.

@@ -318,6 +318,7 @@ void BlockRaster::finish(std::size_t band) {
   const std::vector<std::byte> half = std::move(state.halves[band]);
   state.halves[band] = {};
   const std::size_t bytes = state.sample_bytes;
+  const std::size_t half_columns = state.half_columns();
   const Level& whole = state.levels[0];
   state.file.begin_flush(state.offset_of(whole, band, 0, 0), whole.squares() * state.square_bytes());
   for (std::size_t l = 1; l < state.levels.size(); ++l) {
@@ -332,10 +333,17 @@ void BlockRaster::finish(std::size_t band) {
         const auto* from = reinterpret_cast<const Sample*>(half.data());
         auto* to = reinterpret_cast<Sample*>(square.data());
         std::fill_n(to, std::size_t{kSide} * kSide, nothing);
-        for (std::int32_t r = 0; r < std::min(kSide, level.rows - row); ++r)
-          for (std::int32_t c = 0; c < std::min(kSide, level.columns - column); ++c)
-            to[r * kSide + c] = from[static_cast<std::size_t>(row + r) * step * state.half_columns() +
-                                     static_cast<std::size_t>(column + c) * step];
+        const std::int32_t columns = std::min(kSide, level.columns - column);
+        for (std::int32_t r = 0; r < std::min(kSide, level.rows - row); ++r) {
+          const Sample* row_from = from + static_cast<std::size_t>(row + r) * step * half_columns +
+                                   static_cast<std::size_t>(column) * step;
+          Sample* row_to = to + r * kSide;
+          if (step == 1)
+            std::copy_n(row_from, columns, row_to);
+          else
+            for (std::int32_t c = 0; c < columns; ++c)
+              row_to[c] = row_from[static_cast<std::size_t>(c) * step];
+        }
       };
       if (bytes == sizeof(std::int16_t))
         fill(std::int16_t{});
