@@ -82,6 +82,38 @@ unsigned meet_now(const Crossing* crossings, std::size_t count, std::ptrdiff_t s
               : meet_noting<false, false, false>(crossings, count, shift, groups, rays);
 }
 
+unsigned meet_samples_now(const SampleCrossing* crossings, std::size_t count, std::ptrdiff_t shift,
+                          unsigned groups, RayBundle& rays) {
+  const Vector none = value(MarchGround::kNothing), bound = value(kGroundBound);
+  unsigned raised = 0;
+  for (std::size_t ray = 0; ray < kBundle; ray += hn::Lanes(kTag)) {
+    if (!takes_part(groups, ray)) continue;
+    const Vector before = hn::Load(kTag, rays.slope + ray);
+    const Vector eye = hn::Load(kTag, rays.eye_z + ray);
+    Vector greatest = before, high = hn::Load(kTag, rays.high + ray);
+    Vector slope_run = hn::Load(kTag, rays.slope_run + ray), run = hn::Load(kTag, rays.run + ray);
+    for (std::size_t i = 0; i < count; ++i) {
+      const SampleCrossing& c = crossings[i];
+      const float* z = c.z + shift + ray;
+      const Vector slope = (hn::LoadU(kTag, z) - eye) * value(c.inverse_run);
+      const Mask sure = hn::Min(hn::LoadU(kTag, z - 1), hn::LoadU(kTag, z + 1)) > bound;
+      const Vector met = hn::IfThenElse(sure, slope, none);
+      const Vector may = hn::IfThenElse(sure, none, slope + value(c.error));
+      const Vector run_m = value(1 / c.inverse_run);
+      slope_run = hn::IfThenElse(greatest < met, run_m, slope_run);
+      run = hn::IfThenElse(high < may, run_m, run);
+      greatest = hn::Max(greatest, met);
+      high = hn::Max(high, may);
+    }
+    if (!hn::AllFalse(kTag, before < greatest)) raised |= 1U << (ray / kGroup);
+    hn::Store(greatest, kTag, rays.slope + ray);
+    hn::Store(slope_run, kTag, rays.slope_run + ray);
+    hn::Store(high, kTag, rays.high + ray);
+    hn::Store(run, kTag, rays.run + ray);
+  }
+  return raised;
+}
+
 void meet_high_now(const PossibleCrossing& c, unsigned groups, RayBundle& rays) {
   const Vector none = value(MarchGround::kNothing), bound = value(kGroundBound);
   for (std::size_t ray = 0; ray < kBundle; ray += hn::Lanes(kTag)) {
@@ -285,7 +317,8 @@ void elevations_now(const ElevationRow& k, const RayBundle& rays, std::int16_t* 
                          hn::Abs(slope) * value(k.drift);
     const Vector ray_low = hn::Max(hn::Load(kTag, rays.low + i), slope - error);
     const Vector loose_high = hn::Load(kTag, rays.high + i);
-    const Vector ray_high = hn::Max(loose_high, slope + error);
+    const Vector ray_high =
+        hn::Max(loose_high + hn::Abs(loose_high) * value(k.drift), slope + error);
     const Vector most = hn::Max(ray_high, hn::Load(kTag, rays.rest + i));
     const Mask met = most > none, met_low = ray_low > none;
     const Vector low = clamped(ray_low * shrink - value(k.slope_error));
@@ -320,6 +353,7 @@ HWY_AFTER_NAMESPACE();
 namespace scarp {
 
 HWY_EXPORT(meet_now);
+HWY_EXPORT(meet_samples_now);
 HWY_EXPORT(meet_high_now);
 HWY_EXPORT(meet_loosely_now);
 HWY_EXPORT(may_block_now);
@@ -331,6 +365,11 @@ HWY_EXPORT(note_ground_behind_now);
 unsigned meet(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift, unsigned groups,
               const MeetNotes& notes, RayBundle& rays) {
   return HWY_DYNAMIC_DISPATCH(meet_now)(crossings, count, shift, groups, notes, rays);
+}
+
+unsigned meet_samples(const SampleCrossing* crossings, std::size_t count, std::ptrdiff_t shift,
+                      unsigned groups, RayBundle& rays) {
+  return HWY_DYNAMIC_DISPATCH(meet_samples_now)(crossings, count, shift, groups, rays);
 }
 
 void meet_high(const PossibleCrossing& crossing, unsigned groups, RayBundle& rays) {

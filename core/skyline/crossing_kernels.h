@@ -55,6 +55,18 @@ struct MeetNotes {
 unsigned meet(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift, unsigned groups,
               const MeetNotes& notes, RayBundle& rays);
 
+/// A line that all rays cross so near to a sample that it does not matter on which side.
+struct SampleCrossing {
+  const float* z;     ///< of the bundle's first lane
+  float inverse_run;  ///< 1 / metres
+  float error;        ///< of the slope, where ground is steepest
+};
+/// Raises slope where the samples on both sides are known, and else high: the ray may pass on the
+/// side where there is nothing.
+/// @return the groups of which a slope rose
+unsigned meet_samples(const SampleCrossing* crossings, std::size_t count, std::ptrdiff_t shift,
+                      unsigned groups, RayBundle& rays);
+
 /// A segment that rays may cross, at a share known within `reach`, or not at all.
 struct PossibleCrossing {
   const float* a;  ///< of the bundle's first lane

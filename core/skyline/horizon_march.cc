@@ -81,6 +81,8 @@ class BundleMarch {
     drift_ = 0;
     first_line_ = first_line;
     sure_.clear();
+    at_samples_.clear();
+    samples_end_.assign(1, 0);
     sure_end_.assign(1, 0);
     between_end_.assign(1, 0);
     slack_up_to_.assign(1, 0);
@@ -171,7 +173,13 @@ class BundleMarch {
       };
       if (step.is_between_sure) std::for_each_n(step.between.begin(), step.betweens, keep);
       between_end_.push_back(sure_.size());
-      if (step.is_line_sure) keep(step.at_line);
+      if (step.is_at_samples) {
+        at_samples_.push_back(step.sample_crossing);
+        at_samples_.back().z += shift;
+      } else if (step.is_line_sure) {
+        keep(step.at_line);
+      }
+      samples_end_.push_back(at_samples_.size());
       if (!step.is_between_sure || !step.is_line_sure) unsure_.push_back(k);
       sure_end_.push_back(sure_.size());
       slack_up_to_.push_back(slack);
@@ -200,6 +208,7 @@ class BundleMarch {
       meet_up_to(std::min(end, sure_end_[index(std::min(kMeasuredLines, last))]),
                  {true, search_.measures_distance, fans_});
     meet_up_to(end, notes_for(slack_up_to_[index(after)]));
+    cross_samples(samples_end_[index(first - 1)], samples_end_[index(last)], shift, groups);
     for (auto it = std::lower_bound(unsure_.begin(), unsure_.end(), first);
          it != unsure_.end() && *it <= after; ++it) {
       const Step& step = step_at(*it);
@@ -208,6 +217,14 @@ class BundleMarch {
     }
     flush(groups);
     return raised_;
+  }
+
+  /// Of at_samples_.
+  void cross_samples(std::size_t from, std::size_t to, std::ptrdiff_t shift, unsigned groups) {
+    if (from == to) return;
+    for (std::size_t i = from; i < to; ++i)
+      least_error_ = std::max(least_error_, double{at_samples_[i].error});
+    raised_ |= meet_samples(&at_samples_[from], to - from, shift, groups, *rays_);
   }
 
   /// What to measure of crossings with slacks up to this.
@@ -413,10 +430,12 @@ class BundleMarch {
   struct Step {
     std::int32_t stripe = 0;  ///< that it holds for
     bool is_line_sure = false, is_between_sure = false;
+    bool is_at_samples = false;  ///< of the line, sample_crossing stands for at_line
     std::int32_t line = 0;  ///< of the bundle that it was made for
     int betweens = 0;
     double drift = 0;  ///< relative error of the runs between lines
     Crossing at_line;
+    SampleCrossing sample_crossing;
     std::array<Crossing, 2> between;
   };
 
@@ -425,7 +444,8 @@ class BundleMarch {
     if (step.stripe == stripe_) return step;
     step.stripe = stripe_;
     step.line = line_;
-    step.is_line_sure = make_line(k, step);
+    step.is_at_samples = make_sample_crossing(k, step);
+    step.is_line_sure = step.is_at_samples || make_line(k, step);
     step.betweens = 0;
     step.drift = 0;
     step.is_between_sure = make_between(k, step);
@@ -436,10 +456,40 @@ class BundleMarch {
 
   void cross_line(std::int32_t k, unsigned groups) {
     const Step& step = step_at(k);
-    if (step.is_line_sure)
+    if (step.is_at_samples) {
+      SampleCrossing crossing = step.sample_crossing;
+      crossing.z += shift_of(step);
+      least_error_ = std::max(least_error_, double{crossing.error});
+      raised_ |= meet_samples(&crossing, 1, 0, groups, *rays_);
+    } else if (step.is_line_sure)
       add(step.at_line, shift_of(step), groups);
     else
       cross_loosely(k, 0, kBundle);
+  }
+
+  /// How far from a sample it makes no difference, lanes, or lines; else 0. What rays meet so near to
+  /// it, on a line or between lines, is of the sample's height and distance but for an error that is
+  /// no more than kCheapError.
+  double sample_reach(std::int32_t k) const {
+    if (exact_ || ground_.has_void()) return 0;
+    const double reach = 4 * slack(k) + 2 * kNearSample;
+    return sample_error(k, reach) <= kCheapError ? reach : 0;
+  }
+  double sample_error(std::int32_t k, double reach) const {
+    return 2 * reach * ground_.steepest_m() * inverse_run(k);
+  }
+
+  /// @return false where some ray is not near its sample
+  bool make_sample_crossing(std::int32_t k, Step& to) const {
+    const double reach = sample_reach(k);
+    const double at = place(k), end = at + place_step(k) * (kBundle - 1);
+    const double nearest = std::round(at);
+    if (std::abs(at - nearest) >= reach || std::abs(end - nearest) >= reach) return false;
+    const auto offset = static_cast<std::int32_t>(nearest);
+    if (is_off_grid(offset)) return false;
+    to.sample_crossing = {samples(k, offset), static_cast<float>(inverse_run(k)),
+                          static_cast<float>(sample_error(k, reach))};
+    return true;
   }
 
   /// @return false where some ray is near a sample or in another segment
@@ -545,6 +595,14 @@ class BundleMarch {
     visit_between(k, [&](const BetweenPlace& found) {
       const double near = 2 * found.reach + kNearSample;
       const double least = std::min(found.at, found.end), most = std::max(found.at, found.end);
+      // At a sample, which the line has as well.
+      const double beside = sample_reach(k - 1) > 0 ? near : 0;
+      if (!found.anywhere && near <= kMostBeside &&
+          ((std::abs(least) < beside && std::abs(most) < beside) ||
+           (std::abs(least - 1) < beside && std::abs(most - 1) < beside))) {
+        to.drift = std::max(to.drift, near / (k - 1 + std::max(least - near, 0.0)));
+        return;
+      }
       is_sure = is_sure && !found.anywhere && least >= near && most <= 1 - near &&
                 static_cast<std::size_t>(to.betweens) < to.between.size();
       if (!is_sure) return;
@@ -617,6 +675,7 @@ class BundleMarch {
   static constexpr std::int32_t kLeastLines = 1 << MarchGround::kLeastLevel;
   static constexpr double kSwerveLanes = 64;
   static constexpr double kSureReach = 0.05;
+  static constexpr double kMostBeside = 0.01;  ///< of the way between lines
   static constexpr double kWindowMargin = 1e-3;  ///< lanes
   static constexpr std::int32_t kMostStripeLines = 256;
   static constexpr double kStripeSlack = 1e-4;  ///< lanes per line crossed
@@ -637,6 +696,8 @@ class BundleMarch {
   std::vector<Crossing> sure_;  ///< of the stripe's first line
   /// In sure_, by line crossed: after what lies between it and the one before, and after it.
   std::vector<std::size_t> between_end_, sure_end_;
+  std::vector<SampleCrossing> at_samples_;  ///< lines that sure_ does not have
+  std::vector<std::size_t> samples_end_;    ///< in at_samples_, by line crossed
   std::vector<double> slack_up_to_;   ///< the greatest of those not measured, by line crossed
   std::vector<std::int32_t> unsure_;  ///< lines crossed that sure_ does not have whole
   RayBundle* rays_ = nullptr;
