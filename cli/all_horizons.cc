@@ -218,8 +218,8 @@ class AllHorizonsRun {
         if (distances_) write(*distances_, i, part.distance_m);
         if (sky_) sky_->add(part);
       });
-      for (std::size_t kind = 0; kind < kinds; ++kind) horizons_->finish(i * kinds + kind);
-      if (distances_) distances_->finish(i);
+      if (horizons_) horizons_->finish(i * kinds, kinds);
+      if (distances_) distances_->finish(i, 1);
       progress(++done / azimuths_);
     }
   }

@@ -182,9 +182,6 @@ unsigned meet_loosely_now(const LooseCrossing& c, RayBundle& rays) {
   return raised;
 }
 
-/// What is left out of groups that stay closed, and that are opened.
-constexpr float kMostRest[] = {1e30F, -1e30F};
-
 /// The steepest that rays can see the ground of a square.
 HWY_INLINE Vector steepest(const Square& square, std::size_t ray, Vector eye) {
   Vector most = hn::LoadU(kTag, square.highest[0] + ray);
@@ -194,29 +191,47 @@ HWY_INLINE Vector steepest(const Square& square, std::size_t ray, Vector eye) {
   return hn::Max(rise * value(square.inverse_near), rise * value(square.inverse_far));
 }
 
+/// Above this ground might block.
+HWY_INLINE Vector least_to_block(const RayBundle& rays, std::size_t ray, float tolerance) {
+  const Vector met = hn::Max(hn::Load(kTag, rays.low + ray), hn::Load(kTag, rays.slope + ray));
+  return hn::Max(met + value(tolerance), value(RayBundle::kNone));
+}
+
+/// A group that fits into one vector, without branches.
+HWY_INLINE void ask_vector(const Square* squares, std::size_t count, float tolerance,
+                           std::size_t ray, RayBundle& rays, unsigned* open) {
+  // What is left out of a group that stays closed, and of one that is opened.
+  static constexpr float kMostRest[] = {1e30F, -1e30F};
+  const Vector eye = hn::Load(kTag, rays.eye_z + ray);
+  const Vector least = least_to_block(rays, ray, tolerance);
+  Vector rest = hn::Load(kTag, rays.rest + ray);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vector slope = steepest(squares[i], ray, eye);
+    const unsigned is_open = hn::AllFalse(kTag, slope > least) ? 0 : 1;
+    rest = hn::Max(rest, hn::Min(slope, value(kMostRest[is_open])));
+    open[i] |= is_open << (ray / kGroup);
+  }
+  hn::Store(rest, kTag, rays.rest + ray);
+}
+
 void may_block_now(const Square* squares, std::size_t count, float tolerance, unsigned groups,
                    RayBundle& rays, unsigned* open) {
   for (std::size_t i = 0; i < count; ++i) open[i] = 0;
   const std::size_t lanes = hn::Lanes(kTag);
   for (; groups != 0; groups &= groups - 1) {
     const std::size_t first = static_cast<std::size_t>(std::countr_zero(groups)) * kGroup;
+    if (lanes == kGroup) {
+      ask_vector(squares, count, tolerance, first, rays, open);
+      continue;
+    }
     for (std::size_t i = 0; i < count; ++i) {
       bool is_open = false;
-      for (std::size_t ray = first; ray < first + kGroup; ray += lanes) {
-        const Vector met =
-            hn::Max(hn::Load(kTag, rays.low + ray), hn::Load(kTag, rays.slope + ray));
-        const Vector least = hn::Max(met + value(tolerance), value(RayBundle::kNone));
+      for (std::size_t ray = first; ray < first + kGroup && !is_open; ray += lanes) {
         const Vector slope = steepest(squares[i], ray, hn::Load(kTag, rays.eye_z + ray));
-        is_open = is_open || !hn::AllFalse(kTag, slope > least);
-        // In one vector a group is decided at once, and without a branch.
-        if (lanes == kGroup)
-          hn::Store(hn::Max(hn::Load(kTag, rays.rest + ray),
-                            hn::Min(slope, value(kMostRest[is_open ? 1 : 0]))),
-                    kTag, rays.rest + ray);
+        is_open = !hn::AllFalse(kTag, slope > least_to_block(rays, ray, tolerance));
       }
       open[i] |= (is_open ? 1U : 0U) << (first / kGroup);
-      if (lanes == kGroup || is_open) continue;
-      for (std::size_t ray = first; ray < first + kGroup; ray += lanes) {
+      for (std::size_t ray = first; ray < first + kGroup && !is_open; ray += lanes) {
         const Vector slope = steepest(squares[i], ray, hn::Load(kTag, rays.eye_z + ray));
         hn::Store(hn::Max(hn::Load(kTag, rays.rest + ray), slope), kTag, rays.rest + ray);
       }
@@ -292,6 +307,15 @@ HWY_INLINE Vector arc_tangent_steps(Vector x) {
   return hn::CopySign((base + p) * value(5729.577951F), x);
 }
 
+/// Never below what the angles of two tangents differ by, steps of 0.01 degree, and little above: the
+/// angle grows no faster than where the tangent between them is nearest to 0. 0 where b < a.
+HWY_INLINE Vector steps_between(Vector a, Vector b) {
+  const Vector zero = hn::Zero(kTag);
+  const Vector nearest = hn::Max(hn::Max(a, zero - b), zero);
+  const Vector difference = hn::Max(b - a, zero);
+  return difference * value(5729.58F * (1 + 1e-6F)) / (value(1) + nearest * nearest);
+}
+
 void elevations_now(const ElevationRow& k, const RayBundle& rays, std::int16_t* estimate,
                     std::int16_t* lower, std::int16_t* upper) {
   constexpr float kRounding = 0.02F;  // of the steps: floats up to 9000, and the polynomial
@@ -329,14 +353,17 @@ void elevations_now(const ElevationRow& k, const RayBundle& rays, std::int16_t* 
     const auto tangent = [&](Vector s) { return level + s * (rise + s * value(k.bend)); };
     const Vector low_tangent = tangent(low) - value(k.error) * (one + low * low);
     const Vector high_tangent = tangent(high) + value(k.error) * (one + high * high);
-    Vector least = hn::Floor(arc_tangent_steps(low_tangent) - value(kRounding));
-    Vector greatest = hn::Ceil(arc_tangent_steps(high_tangent) + value(kRounding));
+    const Vector middle_tangent = tangent(middle), middle_steps = arc_tangent_steps(middle_tangent);
+    const Vector below = steps_between(low_tangent, middle_tangent);
+    const Vector above = steps_between(middle_tangent, high_tangent);
+    Vector least = hn::Floor(middle_steps - below - value(kRounding));
+    Vector greatest = hn::Ceil(middle_steps + above + value(kRounding));
     least = hn::IfThenElse(hn::Abs(low) > value(kSteep), least - value(kSteepAllowance), least);
     greatest =
         hn::IfThenElse(hn::Abs(high) > value(kSteep), greatest + value(kSteepAllowance), greatest);
     least = hn::IfThenElse(met_low, hn::Max(least, value(-9000)), value(-9000));
     greatest = hn::Min(greatest, value(9000));
-    const Vector nearest = hn::Floor(arc_tangent_steps(tangent(middle)) + value(0.5F));
+    const Vector nearest = hn::Floor(middle_steps + value(0.5F));
     const Vector best = hn::Min(hn::Max(nearest, least), greatest);
     const Vector nothing = value(kNothingSeen);
     write(hn::IfThenElse(met, best, nothing), estimate + i);

@@ -200,7 +200,7 @@ void MarchGround::join_strips(std::size_t index) {
   const std::int32_t half = 1 << (kLeastLevel + static_cast<int>(index) - 1);
   const std::size_t parts = highest_[index - 1].size() / stride_;
   const double far_lanes = lean_of(half);
-  parallel_for(highest_[index].size() / stride_, [&](std::size_t strip) {
+  const auto join_strip = [&](std::size_t strip) {
     const std::size_t near = 2 * strip + (lean_.line_step > 0 ? 0 : 1);
     const std::size_t far = 2 * strip + (lean_.line_step > 0 ? 1 : 0);
     const auto join = [&](auto& levels, auto nothing) {
@@ -217,7 +217,14 @@ void MarchGround::join_strips(std::size_t index) {
     };
     join(highest_, kNothing);
     if (has_void_) join(void_, std::uint8_t{0});
-  });
+  };
+  // A few are done before other threads have woken.
+  constexpr std::size_t kFew = 8;
+  const std::size_t strips = highest_[index].size() / stride_;
+  if (strips > kFew)
+    parallel_for(strips, join_strip);
+  else
+    for (std::size_t strip = 0; strip < strips; ++strip) join_strip(strip);
 }
 
 }  // namespace scarp

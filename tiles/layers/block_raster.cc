@@ -164,6 +164,28 @@ struct BlockRaster::State {
     return static_cast<std::size_t>((levels[0].columns + 1) / 2);
   }
 
+  /// A square of an overview, from the first one.
+  template <typename Sample>
+  void write_overview(std::size_t band, std::size_t level, std::int32_t column, std::int32_t row) {
+    const Level& to_level = levels[level];
+    const std::size_t step = std::size_t{1} << (level - 1);
+    Sample nothing;
+    std::memcpy(&nothing, nodata.data(), sizeof(Sample));
+    std::vector<Sample> square(std::size_t{kSide} * kSide, nothing);
+    const std::int32_t columns = std::min(kSide, to_level.columns - column);
+    const auto* half = reinterpret_cast<const Sample*>(halves[band].data());
+    for (std::int32_t r = 0; r < std::min(kSide, to_level.rows - row); ++r) {
+      const Sample* from = half + static_cast<std::size_t>(row + r) * step * half_columns() +
+                           static_cast<std::size_t>(column) * step;
+      Sample* to = square.data() + r * kSide;
+      if (step == 1)
+        std::copy_n(from, columns, to);
+      else
+        for (std::int32_t c = 0; c < columns; ++c) to[c] = from[static_cast<std::size_t>(c) * step];
+    }
+    file.write_at(offset_of(to_level, band, column, row), std::as_bytes(std::span(square)));
+  }
+
   Directory directory_of(const Level& level, bool is_overview, std::uint16_t format,
                          const Directory& description) const {
     Directory tags;
@@ -313,45 +335,31 @@ void BlockRaster::write(std::size_t band, std::int32_t first_column, std::int32_
     halve(std::uint32_t{});
 }
 
-void BlockRaster::finish(std::size_t band) {
+void BlockRaster::finish(std::size_t first_band, std::size_t count) {
   State& state = *state_;
-  const std::vector<std::byte> half = std::move(state.halves[band]);
-  state.halves[band] = {};
-  const std::size_t bytes = state.sample_bytes;
-  const std::size_t half_columns = state.half_columns();
   const Level& whole = state.levels[0];
-  state.file.begin_flush(state.offset_of(whole, band, 0, 0), whole.squares() * state.square_bytes());
-  for (std::size_t l = 1; l < state.levels.size(); ++l) {
-    const Level& level = state.levels[l];
-    const std::size_t step = std::size_t{1} << (l - 1);  // in `half`
-    parallel_for(static_cast<std::size_t>(level.squares()), [&](std::size_t i) {
-      const std::int32_t column = static_cast<std::int32_t>(i) % level.across() * kSide;
-      const std::int32_t row = static_cast<std::int32_t>(i) / level.across() * kSide;
-      std::vector<std::byte> square(static_cast<std::size_t>(state.square_bytes()));
-      const auto fill = [&]<typename Sample>(Sample nothing) {
-        std::memcpy(&nothing, state.nodata.data(), sizeof(Sample));
-        const auto* from = reinterpret_cast<const Sample*>(half.data());
-        auto* to = reinterpret_cast<Sample*>(square.data());
-        std::fill_n(to, std::size_t{kSide} * kSide, nothing);
-        const std::int32_t columns = std::min(kSide, level.columns - column);
-        for (std::int32_t r = 0; r < std::min(kSide, level.rows - row); ++r) {
-          const Sample* row_from = from + static_cast<std::size_t>(row + r) * step * half_columns +
-                                   static_cast<std::size_t>(column) * step;
-          Sample* row_to = to + r * kSide;
-          if (step == 1)
-            std::copy_n(row_from, columns, row_to);
-          else
-            for (std::int32_t c = 0; c < columns; ++c)
-              row_to[c] = row_from[static_cast<std::size_t>(c) * step];
-        }
-      };
-      if (bytes == sizeof(std::int16_t))
-        fill(std::int16_t{});
-      else
-        fill(std::uint32_t{});
-      state.file.write_at(state.offset_of(level, band, column, row), square);
-    });
-  }
+  for (std::size_t band = first_band; band < first_band + count; ++band)
+    state.file.begin_flush(state.offset_of(whole, band, 0, 0),
+                           whole.squares() * state.square_bytes());
+  // All squares of all overviews of all bands in one row.
+  struct Square {
+    std::size_t band, level;
+    std::int32_t column, row;
+  };
+  std::vector<Square> squares;
+  for (std::size_t band = first_band; band < first_band + count; ++band)
+    for (std::size_t l = 1; l < state.levels.size(); ++l)
+      for (std::int32_t row = 0; row < state.levels[l].rows; row += kSide)
+        for (std::int32_t column = 0; column < state.levels[l].columns; column += kSide)
+          squares.push_back({band, l, column, row});
+  parallel_for(squares.size(), [&](std::size_t i) {
+    const Square& square = squares[i];
+    if (state.sample_bytes == sizeof(std::int16_t))
+      state.write_overview<std::int16_t>(square.band, square.level, square.column, square.row);
+    else
+      state.write_overview<std::uint32_t>(square.band, square.level, square.column, square.row);
+  });
+  for (std::size_t band = first_band; band < first_band + count; ++band) state.halves[band] = {};
 }
 
 void BlockRaster::commit() {

@@ -36,8 +36,8 @@ class BlockRaster {
   void begin(std::size_t band);
   void write(std::size_t band, std::int32_t first_column, std::int32_t first_row,
              std::int32_t columns, std::int32_t rows, std::span<const std::byte> samples);
-  /// Writes the band's overviews.
-  void finish(std::size_t band);
+  /// Writes the overviews of some bands.
+  void finish(std::size_t first_band, std::size_t count);
 
   /// The file appears. Once, when all bands are finished.
   void commit();
