@@ -137,10 +137,11 @@ class AllHorizonsRun {
         static_cast<std::size_t>(azimuths_) * (options_.output.empty() ? 1 : bands_per_azimuth());
     const bool has_bands = !options_.output.empty() || !options_.distance_output.empty();
     if (has_bands && bands > kMostBands)
-      throw Error(ErrorCode::kUsage,
-                  fmt::format("--azimuths {}: {} bands; at most {} were expected, which is what TIFF "
-                              "can hold; give fewer",
-                              azimuths_, bands, kMostBands));
+      throw Error(
+          ErrorCode::kUsage,
+          fmt::format("--azimuths {}: {} bands; at most {} were expected, which is what TIFF "
+                      "can hold; give fewer",
+                      azimuths_, bands, kMostBands));
   }
 
   void check_memory() const {

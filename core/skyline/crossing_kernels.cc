@@ -77,9 +77,9 @@ unsigned meet_now(const Crossing* crossings, std::size_t count, std::ptrdiff_t s
   if (notes.distance) return meet_noting<true, true, true>(crossings, count, shift, groups, rays);
   if (notes.error)
     return notes.fans ? meet_noting<true, false, true>(crossings, count, shift, groups, rays)
-                : meet_noting<true, false, false>(crossings, count, shift, groups, rays);
+                      : meet_noting<true, false, false>(crossings, count, shift, groups, rays);
   return notes.fans ? meet_noting<false, false, true>(crossings, count, shift, groups, rays)
-              : meet_noting<false, false, false>(crossings, count, shift, groups, rays);
+                    : meet_noting<false, false, false>(crossings, count, shift, groups, rays);
 }
 
 unsigned meet_samples_now(const SampleCrossing* crossings, std::size_t count, std::ptrdiff_t shift,
@@ -307,8 +307,8 @@ HWY_INLINE Vector arc_tangent_steps(Vector x) {
   return hn::CopySign((base + p) * value(5729.577951F), x);
 }
 
-/// Never below what the angles of two tangents differ by, steps of 0.01 degree, and little above: the
-/// angle grows no faster than where the tangent between them is nearest to 0. 0 where b < a.
+/// Never below what the angles of two tangents differ by, steps of 0.01 degree, and little above:
+/// the angle grows no faster than where the tangent between them is nearest to 0. 0 where b < a.
 HWY_INLINE Vector steps_between(Vector a, Vector b) {
   const Vector zero = hn::Zero(kTag);
   const Vector nearest = hn::Max(hn::Max(a, zero - b), zero);

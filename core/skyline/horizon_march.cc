@@ -12,16 +12,10 @@ namespace scarp {
 namespace {
 
 /// Lines that every ray crosses one by one; then strips take over.
-#ifndef NEAR
-#define NEAR 16
-#endif
-constexpr std::int32_t kNearLines = NEAR;
+constexpr std::int32_t kNearLines = 16;
 
 /// Strips are asked first as deep as this share of their distance.
-#ifndef DIS
-#define DIS 2
-#endif
-constexpr std::int32_t kDistanceInStrips = DIS;
+constexpr std::int32_t kDistanceInStrips = 2;
 
 /// Where nothing is known of the neighbours' horizons, lines this share of their distance apart are
 /// crossed beforehand.
@@ -367,8 +361,8 @@ class BundleMarch {
     const double end_fan = fans_ ? place_step(span.last) * (kBundle - 1) : 0;
     const double half = (1 << span.level) / 2.0;
     // Samples on both sides of a ray, and those between its crossings with this line and the next.
-    const double margin = std::max(1.0, most_along_) + slack(span.last) +
-                          fan_.bulge * half * half + kWindowMargin;
+    const double margin =
+        std::max(1.0, most_along_) + slack(span.last) + fan_.bulge * half * half + kWindowMargin;
     const double first = std::min(from + std::min(fan, 0.0), to + std::min(end_fan, 0.0)) - margin;
     const double last = std::max(from + std::max(fan, 0.0), to + std::max(end_fan, 0.0)) + margin;
     square.count = 0;
@@ -431,7 +425,7 @@ class BundleMarch {
     std::int32_t stripe = 0;  ///< that it holds for
     bool is_line_sure = false, is_between_sure = false;
     bool is_at_samples = false;  ///< of the line, sample_crossing stands for at_line
-    std::int32_t line = 0;  ///< of the bundle that it was made for
+    std::int32_t line = 0;       ///< of the bundle that it was made for
     int betweens = 0;
     double drift = 0;  ///< relative error of the runs between lines
     Crossing at_line;
@@ -467,9 +461,9 @@ class BundleMarch {
       cross_loosely(k, 0, kBundle);
   }
 
-  /// How far from a sample it makes no difference, lanes, or lines; else 0. What rays meet so near to
-  /// it, on a line or between lines, is of the sample's height and distance but for an error that is
-  /// no more than kCheapError.
+  /// How far from a sample it makes no difference, lanes, or lines; else 0. What rays meet so near
+  /// to it, on a line or between lines, is of the sample's height and distance but for an error
+  /// that is no more than kCheapError.
   double sample_reach(std::int32_t k) const {
     if (exact_ || ground_.has_void()) return 0;
     const double reach = 4 * slack(k) + 2 * kNearSample;
@@ -675,7 +669,7 @@ class BundleMarch {
   static constexpr std::int32_t kLeastLines = 1 << MarchGround::kLeastLevel;
   static constexpr double kSwerveLanes = 64;
   static constexpr double kSureReach = 0.05;
-  static constexpr double kMostBeside = 0.01;  ///< of the way between lines
+  static constexpr double kMostBeside = 0.01;    ///< of the way between lines
   static constexpr double kWindowMargin = 1e-3;  ///< lanes
   static constexpr std::int32_t kMostStripeLines = 256;
   static constexpr double kStripeSlack = 1e-4;  ///< lanes per line crossed
@@ -698,8 +692,8 @@ class BundleMarch {
   std::vector<std::size_t> between_end_, sure_end_;
   std::vector<SampleCrossing> at_samples_;  ///< lines that sure_ does not have
   std::vector<std::size_t> samples_end_;    ///< in at_samples_, by line crossed
-  std::vector<double> slack_up_to_;   ///< the greatest of those not measured, by line crossed
-  std::vector<std::int32_t> unsure_;  ///< lines crossed that sure_ does not have whole
+  std::vector<double> slack_up_to_;         ///< the greatest of those not measured, by line crossed
+  std::vector<std::int32_t> unsure_;        ///< lines crossed that sure_ does not have whole
   RayBundle* rays_ = nullptr;
   std::vector<Span> spans_, asked_;
   std::vector<Square> squares_;  ///< of asked_
@@ -752,27 +746,26 @@ void place_eyes(const GroundGrid& grid, const MarchGround& ground, std::int32_t 
 /// Of the bundle whose first lane is the tile's i-th.
 void write_elevations(const MarchGround& ground, const RayFan& fan, const MarchTile& tile,
                       std::int32_t i, std::int32_t line, const RayBundle& rays,
-                      const BundleMarch& march, const MarchSearch& search,
-                      TileHorizons& horizons) {
+                      const BundleMarch& march, const MarchSearch& search, TileHorizons& horizons) {
   const double p = i - (tile.lanes - 1) / 2.0;
   const double q = line - tile.first_line - (tile.lines - 1) / 2.0;
   const double z_m = ground.middle_z_m() - fan.middle_z_m;
   const double shrink = 1 / fan.stretch.at(p, q);
   const double nearest = fan.reach() > 0 ? fan.inverse_run[1] : 0;
   ElevationRow row{static_cast<float>(fan.level.at(p, q) + fan.level_z * z_m),
-                         static_cast<float>(fan.level.per_lane),
-                         static_cast<float>(fan.rise.at(p, q) + fan.rise_z * z_m),
-                         static_cast<float>(fan.rise.per_lane),
-                         static_cast<float>(fan.level_z),
-                         static_cast<float>(fan.rise_z),
-                         static_cast<float>(fan.bend),
-                         static_cast<float>(shrink),
-                         static_cast<float>(-fan.stretch.per_lane * shrink * shrink),
-                         static_cast<float>(fan.tangent_error),
-                         static_cast<float>(4 * ground.rounding_m() * nearest),
-                         static_cast<float>(march.least_error()),
-                         static_cast<float>(march.drift()),
-                         ground.has_void()};
+                   static_cast<float>(fan.level.per_lane),
+                   static_cast<float>(fan.rise.at(p, q) + fan.rise_z * z_m),
+                   static_cast<float>(fan.rise.per_lane),
+                   static_cast<float>(fan.level_z),
+                   static_cast<float>(fan.rise_z),
+                   static_cast<float>(fan.bend),
+                   static_cast<float>(shrink),
+                   static_cast<float>(-fan.stretch.per_lane * shrink * shrink),
+                   static_cast<float>(fan.tangent_error),
+                   static_cast<float>(4 * ground.rounding_m() * nearest),
+                   static_cast<float>(march.least_error()),
+                   static_cast<float>(march.drift()),
+                   ground.has_void()};
   if (ground.is_upside_down()) {
     // Slopes s and heights z are those of the ground times -1, and so shall tangents be.
     for (float* part : {&row.level, &row.level_step, &row.rise_z, &row.bend}) *part = -*part;

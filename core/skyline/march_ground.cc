@@ -64,7 +64,8 @@ void raise_to(std::size_t count, double least, double most, const Value* from, V
       raise_to_one(a, b, shift, from, to);
     // The lanes that have only one of two: borders of the padding, of which nothing is known.
     if (two && a > 0) raise_to_one(a - 1, a, shift + 1, from, to);
-    if (two && b < end && b + shift >= 0 && b + shift < end) raise_to_one(b, b + 1, shift, from, to);
+    if (two && b < end && b + shift >= 0 && b + shift < end)
+      raise_to_one(b, b + 1, shift, from, to);
     shift += two ? 2 : 1;
   }
 }

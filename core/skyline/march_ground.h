@@ -30,9 +30,9 @@ struct StripLean {
 /// an azimuth do, so that they are little wider than a ray; where rays of one azimuth run too
 /// differently, strips are squares instead.
 ///
-/// Heights are flattened metres above middle_z_m (below it upside down), in float: exact below 4096 m, because lattice
-/// steps are 2^-12 m, and otherwise within rounding_m.
-/// Memory: 5 bytes a sample; a quarter more where there is void.
+/// Heights are flattened metres above middle_z_m (below it upside down), in float: exact below 4096
+/// m, because lattice steps are 2^-12 m, and otherwise within rounding_m. Memory: 5 bytes a sample;
+/// a quarter more where there is void.
 class MarchGround {
  public:
   /// Heights where there are no data: nothing beyond the raster, and void within it.
@@ -42,10 +42,7 @@ class MarchGround {
 
   /// Lanes beyond either border that may be read: kNothing.
   static constexpr std::int32_t kPad = 272;
-  #ifndef LEVEL
-#define LEVEL 3
-#endif
-  static constexpr int kLeastLevel = LEVEL;  ///< of strips: 8 lines
+  static constexpr int kLeastLevel = 3;  ///< of strips: 8 lines
 
   /// Without strips.
   /// @param upside_down  heights are those of the ground times -1

@@ -47,9 +47,9 @@ void SkyView::begin_azimuth() {
 void SkyView::add(const SkylinePart& part) {
   for (std::int32_t r = 0; r < part.rows; ++r) {
     const std::int16_t* row = part.estimate.data() + std::ptrdiff_t{r} * part.columns;
-    const std::size_t first = static_cast<std::size_t>(part.first_row + r) *
-                                  static_cast<std::size_t>(columns_) +
-                              static_cast<std::size_t>(part.first_column);
+    const std::size_t first =
+        static_cast<std::size_t>(part.first_row + r) * static_cast<std::size_t>(columns_) +
+        static_cast<std::size_t>(part.first_column);
     for (std::size_t c = 0; c < static_cast<std::size_t>(part.columns); ++c) {
       const std::int16_t steps = row[c];
       const std::size_t i = first + c;

@@ -289,8 +289,8 @@ std::size_t cast_shadow(const GroundGrid& grid, const std::optional<EarthFrame>&
         const std::size_t i = static_cast<std::size_t>(r) * static_cast<std::size_t>(part.columns) +
                               static_cast<std::size_t>(c);
         const std::int32_t column = part.first_column + c, row = part.first_row + r;
-        Sunlight& to = light[static_cast<std::size_t>(row) * columns +
-                             static_cast<std::size_t>(column)];
+        Sunlight& to =
+            light[static_cast<std::size_t>(row) * columns + static_cast<std::size_t>(column)];
         to = Sunlight::kUnknown;
         if (!grid.is_known(column, row) || part.lower[i] == kUnknownElevation) continue;
         const EyeBearings bearings(grid.at(column, row), earth);

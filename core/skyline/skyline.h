@@ -24,8 +24,8 @@ struct SkylineOptions {
 };
 
 /// One azimuth's horizons of a rectangle of samples, each [rows * columns], in steps of 0.01 degree
-/// above the level plane of the sample's eye. kNothingSeen: no ground lies that way within the data;
-/// kUnknownElevation: the sample is void, or the ray passes void before known ground.
+/// above the level plane of the sample's eye. kNothingSeen: no ground lies that way within the
+/// data; kUnknownElevation: the sample is void, or the ray passes void before known ground.
 struct SkylinePart {
   std::int32_t first_column = 0, first_row = 0, columns = 0, rows = 0;
   std::span<const std::int16_t> estimate, lower, upper;

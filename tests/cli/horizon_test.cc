@@ -119,6 +119,11 @@ TEST_F(HorizonCommand, SkyViewOpennessAndShadow) {
   EXPECT_GT(read(1, "sky.tif")[0], 0.99);
   EXPECT_LT(read(1, "open.tif")[4], 85);
   EXPECT_GT(read(1, "open.tif")[5], 90);
+  // From the wall down its side, from its foot up along it.
+  ASSERT_EQ(horizon("--azimuths 10 --negative-openness " + out("down.tif")).exit_code, 0);
+  EXPECT_LT(read(1, "down.tif")[5], 85);
+  EXPECT_GT(read(1, "down.tif")[4], 90);
+  EXPECT_TRUE(std::isnan(read(1, "down.tif")[5 * kColumns]));
   // In the morning the wall's shadow falls to the west: at this time over the whole plain there.
   ASSERT_EQ(horizon("-o " + out() + " --sun 2026-06-21T13:00Z --json").exit_code, 0);
   EXPECT_EQ(read(1)[2 * kColumns + 4], 0);
@@ -147,7 +152,8 @@ TEST_F(HorizonCommand, RefusesInOneLineAndLeavesNothing) {
   refused(to + " --sky-view " + out(), 2, "twice");
   refused(to + " --crs OGC:CRS84", 2, "--crs");
   refused(to + " --refraction 2", 1, "refraction");
-  refused(to + " --azimuths 100000 --memory 10M", 1, "--azimuths");
+  refused(to + " --azimuths 100000", 2, "--azimuths");
+  refused(to + " --memory 700", 1, "--memory");
   EXPECT_NE(run_scarp("$SCARP horizon " + degrees() + " " + to).errors.find("CRS"),
             std::string::npos);
   refused("--at 500150,3999850 --sky-view " + out(), 2, "--sky-view");

@@ -155,14 +155,12 @@ struct BlockRaster::State {
   std::uint64_t square_bytes() const { return std::uint64_t{kSide} * kSide * sample_bytes; }
   std::uint64_t offset_of(const Level& level, std::size_t band, std::int32_t column,
                           std::int32_t row) const {
-    const auto square = static_cast<std::uint64_t>(row / kSide) *
-                            static_cast<std::uint64_t>(level.across()) +
-                        static_cast<std::uint64_t>(column / kSide);
+    const auto square =
+        static_cast<std::uint64_t>(row / kSide) * static_cast<std::uint64_t>(level.across()) +
+        static_cast<std::uint64_t>(column / kSide);
     return level.offset + (band * level.squares() + square) * square_bytes();
   }
-  std::size_t half_columns() const {
-    return static_cast<std::size_t>((levels[0].columns + 1) / 2);
-  }
+  std::size_t half_columns() const { return static_cast<std::size_t>((levels[0].columns + 1) / 2); }
 
   /// A square of an overview, from the first one.
   template <typename Sample>
@@ -203,8 +201,8 @@ struct BlockRaster::State {
     std::vector<std::uint64_t> offsets(squares);
     for (std::size_t i = 0; i < squares; ++i) offsets[i] = level.offset + i * square_bytes();
     tags[kTileOffsets] = entry(kLong8, offsets);
-    tags[kTileByteCounts] =
-        entry(kLong, std::vector<std::uint32_t>(squares, static_cast<std::uint32_t>(square_bytes())));
+    tags[kTileByteCounts] = entry(
+        kLong, std::vector<std::uint32_t>(squares, static_cast<std::uint32_t>(square_bytes())));
     if (bands > 1) tags[kExtraSamples] = shorts(bands - 1, 0);
     tags[kSampleFormat] = shorts(bands, format);
     for (const auto& [tag, value] : description)
@@ -305,7 +303,8 @@ void BlockRaster::write(std::size_t band, std::int32_t first_column, std::int32_
                         std::int32_t columns, std::int32_t rows,
                         std::span<const std::byte> samples) {
   State& state = *state_;
-  const std::size_t bytes = state.sample_bytes, row_bytes = static_cast<std::size_t>(columns) * bytes;
+  const std::size_t bytes = state.sample_bytes,
+                    row_bytes = static_cast<std::size_t>(columns) * bytes;
   assert(first_column % kSide == 0 && first_row % kSide == 0 && columns <= kSide && rows <= kSide);
   assert(samples.size() == row_bytes * static_cast<std::size_t>(rows));
   std::vector<std::byte> whole;
@@ -326,7 +325,7 @@ void BlockRaster::write(std::size_t band, std::int32_t first_column, std::int32_
       Sample* to = half + static_cast<std::size_t>((first_row + r) / 2) * state.half_columns() +
                    first_column / 2;
       const Sample* row = from + std::ptrdiff_t{r} * columns;
-      for (std::int32_t c = 0; c < columns; c += 2) to[c / 2] = row[c];
+      for (std::ptrdiff_t c = 0; c < (columns + 1) / 2; ++c) to[c] = row[2 * c];
     }
   };
   if (bytes == sizeof(std::int16_t))

@@ -36,7 +36,7 @@ struct RasterLayer {
   std::vector<RasterBand> more_bands;  ///< after the first, with its unit, nodata and scale
   double scale = 1;                    ///< what a step of the numbers is worth, in the unit
   std::string unit;                    ///< such as "m"; empty: none
-  std::optional<double> nodata;  ///< NaN is allowed for float
+  std::optional<double> nodata;        ///< NaN is allowed for float
   /// Red, green, blue, alpha of the values from 0 on; for uint8 only, at most 256. Empty: none.
   std::vector<std::array<std::uint8_t, 4>> colours;
   std::map<std::string, std::string> metadata;
