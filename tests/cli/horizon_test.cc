@@ -85,7 +85,7 @@ TEST_F(HorizonCommand, WritesThreeBandsAnAzimuthAndSaysHow) {
   EXPECT_EQ(dataset->GetRasterBand(4)->GetNoDataValue(), -32768);
   EXPECT_STREQ(dataset->GetMetadataItem("SURFACE"), "grid");
   EXPECT_STREQ(dataset->GetMetadataItem("EARTH"), "flat");
-  EXPECT_STREQ(dataset->GetMetadataItem("LAYOUT", "IMAGE_STRUCTURE"), "COG");
+  EXPECT_STREQ(dataset->GetMetadataItem("INTERLEAVE", "IMAGE_STRUCTURE"), "BAND");
   const double at_wall = std::atan(50.0 / 400) * 18'000 / M_PI;
   EXPECT_NEAR(read(4)[kColumns + 1], at_wall, 1);
   EXPECT_LE(read(5)[kColumns + 1], at_wall);
@@ -131,6 +131,16 @@ TEST_F(HorizonCommand, SkyViewOpennessAndShadow) {
   EXPECT_EQ(read(1)[5 * kColumns], 255);
   const GDALDatasetUniquePtr dataset(GDALDataset::Open(out().c_str(), GDAL_OF_RASTER));
   EXPECT_NEAR(std::atof(dataset->GetMetadataItem("SUN_ELEVATION_DEG")), 3.2, 1.5);
+}
+
+/// Bands go to the disk as they are found: memory does not depend on how many there are.
+TEST_F(HorizonCommand, ManyAzimuthsTakeNoMoreMemory) {
+  const std::string options = " --azimuths 300 --overwrite --threads ";
+  ASSERT_EQ(horizon("-o " + out() + options + "2").exit_code, 0);
+  const RunResult small = horizon("-o " + out("small.tif") + options + "1 --memory 900");
+  ASSERT_EQ(small.exit_code, 0) << small.errors;
+  EXPECT_EQ(run_scarp("cmp " + out() + " " + out("small.tif")).exit_code, 0);
+  EXPECT_EQ(std::filesystem::file_size(out()), std::filesystem::file_size(out("small.tif")));
 }
 
 TEST_F(HorizonCommand, RefusesInOneLineAndLeavesNothing) {

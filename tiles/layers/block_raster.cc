@@ -213,19 +213,12 @@ struct BlockRaster::State {
   /// All directories before all samples, the smallest overview's first. Run twice: the first time
   /// to learn how long they are.
   std::vector<std::byte> lay_out(std::uint16_t format, const Directory& description) {
-    // GDAL's way of saying that the order is that of a cloud-optimised file.
-    const std::string layout = "LAYOUT=IFDS_BEFORE_DATA\nKNOWN_INCOMPATIBLE_EDITION=NO\n ";
-    const std::string ghost =
-        fmt::format("GDAL_STRUCTURAL_METADATA_SIZE={:06} bytes\n{}", layout.size(), layout);
     std::vector<std::byte> head;
-    const std::size_t first = 16 + (ghost.size() + 7) / 8 * 8;
     put(head, std::uint16_t{0x4949});
     put(head, std::uint16_t{43});
     put(head, std::uint16_t{8});
     put(head, std::uint16_t{0});
-    put(head, static_cast<std::uint64_t>(first));
-    put_bytes(head, ghost.data(), ghost.size());
-    head.resize(first);
+    put(head, std::uint64_t{16});  // where the first directory begins: here
     for (std::size_t i = 0; i < levels.size(); ++i) {
       const Directory tags = directory_of(levels[i], i > 0, format, description);
       std::uint64_t values_at = head.size() + 8 + 20 * tags.size() + 8;
