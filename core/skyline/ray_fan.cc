@@ -110,13 +110,16 @@ struct PlanRay {
   /// Where it crosses a line; nothing outside the grid.
   std::optional<Crossing> cross(const PlanMap& map, double at_line, double guess_lanes) const {
     if (at_line < 0 || at_line > map.lines() - 1) return {};
+    constexpr double kSettledLanes = 1e-11;
     double at = lane + guess_lanes;
     for (int i = 0; i < 4; ++i) {
       const double inside = std::clamp(at, 0.0, map.lanes() - 1);
       const Position p = map.at(inside, at_line);
       const auto step = map.lane_step(inside, at_line);
       const double off = (p.x_m - from.x_m) * y - (p.y_m - from.y_m) * x;
+      const double before = at;
       at = inside - off / (step[0] * y - step[1] * x);
+      if (std::abs(at - before) < kSettledLanes) break;
     }
     constexpr double kBorder = 1e-6;
     if (at < -kBorder || at > map.lanes() - 1 + kBorder) return {};

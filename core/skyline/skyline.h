@@ -48,7 +48,7 @@ struct SkylineBands {
 /// step at most, but where a ray grazes the border of the data or of void. The estimate is the
 /// greatest crossing compared, most often the horizon itself.
 /// Void: where a ray comes so near to void that it is not certain to miss it, it is unknown too.
-/// Cost: see march_tile; the same bits for any number of threads.
+/// Cost: see march_tile; the same bits for any number of threads and parts.
 /// Memory: the grid's 4 bytes a sample, 5 more (5.3 where there is void), and 1 MB a thread.
 class Skyline {
  public:
