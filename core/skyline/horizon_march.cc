@@ -46,12 +46,13 @@ class BundleMarch {
         fans_(fan.turn.per_lane != 0) {}
 
   /// Lines of cells that share the places of their crossings: so many that these are off by
-  /// kStripeSlack at most.
+  /// kStripeSlack at most, or kStripeSlackBesideVoid.
   std::int32_t stripe_lines() const {
     const double change = std::abs(fan_.turn.per_line);
-    return change * kMostStripeLines <= kStripeSlack
+    const double slack = ground_.has_void() ? kStripeSlackBesideVoid : kStripeSlack;
+    return change * kMostStripeLines <= slack
                ? kMostStripeLines
-               : std::max(1, static_cast<std::int32_t>(kStripeSlack / change));
+               : std::max(1, static_cast<std::int32_t>(slack / change));
   }
 
   /// Relative error of the runs of the crossings so far in the stripe.
@@ -672,7 +673,8 @@ class BundleMarch {
   static constexpr double kMostBeside = 0.01;    ///< of the way between lines
   static constexpr double kWindowMargin = 1e-3;  ///< lanes
   static constexpr std::int32_t kMostStripeLines = 256;
-  static constexpr double kStripeSlack = 1e-4;  ///< lanes per line crossed
+  /// Lanes per line crossed; where there is void, rays that are not certain to miss it are unknown.
+  static constexpr double kStripeSlack = 1e-4, kStripeSlackBesideVoid = 2e-5;
 
   const MarchGround& ground_;
   const RayFan& fan_;

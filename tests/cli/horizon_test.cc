@@ -119,10 +119,10 @@ TEST_F(HorizonCommand, SkyViewOpennessAndShadow) {
   EXPECT_GT(read(1, "sky.tif")[0], 0.99);
   EXPECT_LT(read(1, "open.tif")[4], 85);
   EXPECT_GT(read(1, "open.tif")[5], 90);
-  // From the wall down its side, from its foot up along it.
+  // From the wall down its side; from its foot the plain is lower than the wall.
   ASSERT_EQ(horizon("--azimuths 10 --negative-openness " + out("down.tif")).exit_code, 0);
   EXPECT_LT(read(1, "down.tif")[5], 85);
-  EXPECT_GT(read(1, "down.tif")[4], 90);
+  EXPECT_NEAR(read(1, "down.tif")[4], 90, 0.05);
   EXPECT_TRUE(std::isnan(read(1, "down.tif")[5 * kColumns]));
   // In the morning the wall's shadow falls to the west: at this time over the whole plain there.
   ASSERT_EQ(horizon("-o " + out() + " --sun 2026-06-21T13:00Z --json").exit_code, 0);
