@@ -7,8 +7,10 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -19,12 +21,12 @@
 /// Horizons of all points: the whole command `scarp horizon` with and without bounds, nanoseconds
 /// a cell and direction, wall time and time of processors, and its share for looking alone, on Big
 /// Tujunga refined to SIDE x SIDE samples; against `r.horizon` where GRASS is installed (the module
-/// alone, on sides up to 4096), which runs right before and right after.
+/// alone, on sides up to 2048), which runs right before and right after.
 /// Usage: horizons_bench [REPEATS (3) [SIDE ...  (1024 2048 4096 8192)]]
 namespace scarp {
 namespace {
 
-constexpr int kLargestForGrass = 4096;
+constexpr int kLargestForGrass = 2048;
 
 /// The command's own default; fewer where the output would be many gigabytes.
 int azimuths_of(int side) {
@@ -60,17 +62,24 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-/// Wall time of one r.horizon in a project of its own, seconds a direction; 0 where it failed.
-double grass_seconds(const std::string& file, int azimuths) {
-  const std::string inside = fmt::format(
-      "r.in.gdal -o input=\"{}\" output=dem --quiet && g.region raster=dem && b=$(date +%s%N) && "
-      "r.horizon elevation=dem start=10 step={} output=h --quiet >/dev/null && "
-      "echo nanoseconds $(($(date +%s%N) - b))",
+/// What r.horizon takes in a project of its own, seconds a direction; 0 where it failed.
+struct GrassCost {
+  double wall = 0, processors = 0;
+};
+GrassCost grass_cost(const std::string& file, int azimuths, const test::TempFolder& folder) {
+  const std::string script = folder.path("grass.sh");
+  std::ofstream(script) << fmt::format(
+      "set -e\nr.in.gdal -o input='{}' output=dem --quiet\ng.region raster=dem\n"
+      "TIMEFORMAT='seconds %R %U'\n"
+      "time r.horizon elevation=dem start=10 step={} output=h --quiet >/dev/null 2>&1\n",
       file, 360.0 / azimuths);
-  const std::string text = output_of(
-      fmt::format("grass --tmp-location '{}' --exec sh -c '{}' 2>/dev/null", file, inside));
-  const std::size_t at = text.rfind("nanoseconds ");
-  return at == std::string::npos ? 0 : 1e-9 * std::atof(text.c_str() + at + 12) / azimuths;
+  const std::string text =
+      output_of(fmt::format("grass --tmp-location '{}' --exec bash '{}' 2>&1", file, script));
+  const std::size_t at = text.rfind("seconds ");
+  if (at == std::string::npos) return {};
+  GrassCost cost;
+  std::istringstream(text.substr(at + 8)) >> cost.wall >> cost.processors;
+  return {cost.wall / azimuths, cost.processors / azimuths};
 }
 
 /// Medians of whole runs, seconds a direction.
@@ -113,7 +122,7 @@ void measure(const std::string& scarp, const std::string& dem, int side, int rep
   const bool has_grass =
       side <= kLargestForGrass && std::system("command -v grass >/dev/null") == 0;
   const int grass_azimuths = grass_azimuths_of(side);
-  double grass_s = has_grass ? grass_seconds(file, grass_azimuths) : 0;
+  GrassCost grass = has_grass ? grass_cost(file, grass_azimuths, folder) : GrassCost{};
   std::vector<std::pair<std::string, Cost>> costs;
   for (const auto& [name, options] : {std::pair("with bounds", "--earth flat"),
                                       std::pair("estimate", "--earth flat --estimate-only"),
@@ -122,10 +131,13 @@ void measure(const std::string& scarp, const std::string& dem, int side, int rep
                                          file, output, azimuths, options);
     if (const auto cost = cost_of(line, output, azimuths, repeats)) costs.push_back({name, *cost});
   }
-  if (grass_s > 0) {
-    grass_s = (grass_s + grass_seconds(file, grass_azimuths)) / 2;
-    fmt::print("{:>5} x {:<5} r.horizon          {:7.1f} ns a cell and direction\n", side, side,
-               grass_s * scale);
+  if (grass.wall > 0) {
+    const GrassCost after = grass_cost(file, grass_azimuths, folder);
+    grass = {(grass.wall + after.wall) / 2, (grass.processors + after.processors) / 2};
+    fmt::print(
+        "{:>5} x {:<5} r.horizon          {:7.1f} ns a cell and direction, {:26.1f} of "
+        "processors\n",
+        side, side, grass.wall * scale, grass.processors * scale);
   }
   for (const auto& [name, cost] : costs) {
     fmt::print(
@@ -133,9 +145,9 @@ void measure(const std::string& scarp, const std::string& dem, int side, int rep
         "processors; {:5.1f} bytes a cell",
         side, side, name, cost.wall * scale, cost.look * scale, cost.processors * scale,
         cost.peak_bytes / cells);
-    if (grass_s > 0)
+    if (grass.wall > 0)
       fmt::print("; r.horizon takes {:.0f} times as long, {:.0f} times as much of processors",
-                 grass_s / cost.wall, grass_s / cost.processors);
+                 grass.wall / cost.wall, grass.processors / cost.processors);
     fmt::print("\n");
   }
 }
