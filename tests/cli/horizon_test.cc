@@ -133,6 +133,38 @@ TEST_F(HorizonCommand, SkyViewOpennessAndShadow) {
   EXPECT_NEAR(std::atof(dataset->GetMetadataItem("SUN_ELEVATION_DEG")), 3.2, 1.5);
 }
 
+/// From a corner of the sea, away from where levels are those of the frame: what is seen lowest is
+/// the farthest water, half the angle to it below the level plane.
+TEST_F(HorizonCommand, OpennessOfTheSea) {
+  constexpr int kSide = 60;
+  constexpr double kCell = 0.02;
+  const std::string sea = folder_.path("sea.tif");
+  GDALDataset* dataset = GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
+      sea.c_str(), kSide, kSide, 1, GDT_Float32, nullptr);
+  double transform[6] = {10, kCell, 0, 1, 0, -kCell};
+  dataset->SetGeoTransform(transform);
+  OGRSpatialReference crs;
+  crs.SetFromUserInput("EPSG:4326");
+  dataset->SetSpatialRef(&crs);
+  dataset->GetRasterBand(1)->Fill(0);
+  GDALClose(dataset);
+  ASSERT_EQ(run_scarp("$SCARP horizon " + sea + " --azimuths 4 --openness " + out("up.tif") +
+                      " --negative-openness " + out("down.tif"))
+                .exit_code,
+            0);
+  const auto at_corner = [&](const std::string& name) {
+    const GDALDatasetUniquePtr written(GDALDataset::Open(out(name).c_str(), GDAL_OF_RASTER));
+    float value = 0;
+    EXPECT_EQ(
+        written->GetRasterBand(1)->RasterIO(GF_Read, 0, 0, 1, 1, &value, 1, 1, GDT_Float32, 0, 0),
+        CE_None);
+    return value;
+  };
+  // East and south, 59 cells each; near the equator a degree is nearly a degree.
+  EXPECT_NEAR(at_corner("down.tif"), 90 - 59 * kCell / 2, 0.02);
+  EXPECT_NEAR(at_corner("up.tif"), 90 + kCell / 2, 0.02);
+}
+
 /// Bands go to the disk as they are found: memory does not depend on how many there are.
 TEST_F(HorizonCommand, ManyAzimuthsTakeNoMoreMemory) {
   const std::string options = " --azimuths 300 --overwrite --threads ";
