@@ -351,7 +351,8 @@ void BlockRaster::finish(std::size_t first_band, std::size_t count) {
     else
       state.write_overview<std::uint32_t>(square.band, square.level, square.column, square.row);
   });
-  for (std::size_t band = first_band; band < first_band + count; ++band) state.halves[band] = {};
+  for (std::size_t band = first_band; band < first_band + count; ++band)
+    std::vector<std::byte>().swap(state.halves[band]);  // {} would keep the memory
 }
 
 void BlockRaster::commit() {
