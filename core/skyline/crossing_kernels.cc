@@ -343,7 +343,9 @@ void elevations_now(const ElevationRow& k, const RayBundle& rays, std::int16_t* 
     const Vector loose_high = hn::Load(kTag, rays.high + i);
     const Vector ray_high =
         hn::Max(loose_high + hn::Abs(loose_high) * value(k.drift), slope + error);
-    const Vector most = hn::Max(ray_high, hn::Load(kTag, rays.rest + i));
+    const Vector rest = hn::Load(kTag, rays.rest + i);
+    const Vector most =
+        hn::Max(ray_high, rest + hn::Abs(rest) * value(k.drift) + value(k.least_error));
     const Mask met = most > none, met_low = ray_low > none;
     const Vector low = clamped(ray_low * shrink - value(k.slope_error));
     const Vector high = clamped(most * shrink + value(k.slope_error));

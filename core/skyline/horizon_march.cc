@@ -59,7 +59,7 @@ class BundleMarch {
   double drift() const { return drift_; }
 
   /// Bound of the error of crossings that were not measured so far in the bundle, as a slope.
-  double least_error() const { return least_error_; }
+  double least_error() const { return std::max(least_error_, stripe_error_); }
 
   /// Begins a stripe of bundles, one above the other.
   void begin_stripe(std::int32_t lane, std::int32_t first_line, std::int32_t lines) {
@@ -75,6 +75,7 @@ class BundleMarch {
     ++stripe_;
     drift_ = 0;
     first_line_ = first_line;
+    stripe_error_ = 0;
     sure_.clear();
     at_samples_.clear();
     samples_end_.assign(1, 0);
@@ -158,6 +159,8 @@ class BundleMarch {
   void list_crossings(std::int32_t last) {
     for (auto k = static_cast<std::int32_t>(sure_end_.size()); k <= last; ++k) {
       const Step& step = step_at(k);
+      // The sample may belong to a strip that is not opened.
+      if (step.leaves_out) stripe_error_ = kCheapError;
       const std::ptrdiff_t shift = (first_line_ - step.line) * ground_.stride();
       double slack = slack_up_to_.back();
       const auto keep = [&](const Crossing& crossing) {
@@ -425,6 +428,7 @@ class BundleMarch {
   struct Step {
     std::int32_t stripe = 0;  ///< that it holds for
     bool is_line_sure = false, is_between_sure = false;
+    bool leaves_out = false;     ///< what is between lines, because a line's sample stands for it
     bool is_at_samples = false;  ///< of the line, sample_crossing stands for at_line
     std::int32_t line = 0;       ///< of the bundle that it was made for
     int betweens = 0;
@@ -442,6 +446,7 @@ class BundleMarch {
     step.is_at_samples = make_sample_crossing(k, step);
     step.is_line_sure = step.is_at_samples || make_line(k, step);
     step.betweens = 0;
+    step.leaves_out = false;
     step.drift = 0;
     step.is_between_sure = make_between(k, step);
     if (step.is_between_sure) drift_ = std::max(drift_, step.drift);
@@ -462,13 +467,15 @@ class BundleMarch {
       cross_loosely(k, 0, kBundle);
   }
 
-  /// How far from a sample it makes no difference, lanes, or lines; else 0. What rays meet so near
-  /// to it, on a line or between lines, is of the sample's height and distance but for an error
-  /// that is no more than kCheapError.
+  /// How far from a sample it makes no difference, lanes; 0: nowhere. What rays meet so near to it,
+  /// on a line or between lines, is of the sample's height but for an error of no more than
+  /// kCheapError, as a slope.
   double sample_reach(std::int32_t k) const {
     if (exact_ || ground_.has_void()) return 0;
-    const double reach = 4 * slack(k) + 2 * kNearSample;
-    return sample_error(k, reach) <= kCheapError ? reach : 0;
+    const double least = 4 * slack(k) + 2 * kNearSample;
+    const double steepest_m = std::max(ground_.steepest_m(), 1e-3);
+    const double most = kCheapError / (2 * steepest_m * inverse_run(k));
+    return most < least ? 0 : std::min(most, kMostBeside);
   }
   double sample_error(std::int32_t k, double reach) const {
     return 2 * reach * ground_.steepest_m() * inverse_run(k);
@@ -591,11 +598,12 @@ class BundleMarch {
       const double near = 2 * found.reach + kNearSample;
       const double least = std::min(found.at, found.end), most = std::max(found.at, found.end);
       // At a sample, which the line has as well.
-      const double beside = sample_reach(k - 1) > 0 ? near : 0;
-      if (!found.anywhere && near <= kMostBeside &&
-          ((std::abs(least) < beside && std::abs(most) < beside) ||
-           (std::abs(least - 1) < beside && std::abs(most - 1) < beside))) {
-        to.drift = std::max(to.drift, near / (k - 1 + std::max(least - near, 0.0)));
+      const double along = std::abs(place(k) - place(k - 1));
+      const double beside = along < kLeastBeside ? 0 : sample_reach(k - 1) / along - near;
+      if (!found.anywhere && ((std::abs(least) < beside && std::abs(most) < beside) ||
+                              (std::abs(least - 1) < beside && std::abs(most - 1) < beside))) {
+        to.drift = std::max(to.drift, (beside + near) / (k - 1 + std::max(least - near, 0.0)));
+        to.leaves_out = true;
         return;
       }
       is_sure = is_sure && !found.anywhere && least >= near && most <= 1 - near &&
@@ -670,7 +678,9 @@ class BundleMarch {
   static constexpr std::int32_t kLeastLines = 1 << MarchGround::kLeastLevel;
   static constexpr double kSwerveLanes = 64;
   static constexpr double kSureReach = 0.05;
-  static constexpr double kMostBeside = 0.01;    ///< of the way between lines
+  /// How near a sample may stand for what is beside it, lanes, and for rays that run so much along.
+  static constexpr double kLeastBeside = 0.5;
+  static constexpr double kMostBeside = 0.002;   ///< of the way between lines
   static constexpr double kWindowMargin = 1e-3;  ///< lanes
   static constexpr std::int32_t kMostStripeLines = 256;
   /// Lanes per line crossed; where there is void, rays that are not certain to miss it are unknown.
@@ -703,7 +713,7 @@ class BundleMarch {
   bool knows_strips_ = false;
   std::vector<StripGroups> productive_, before_;  ///< that raised low bounds; of the bundle before
   std::vector<StripGroups> crossed_;              ///< already, in this bundle
-  double least_error_ = 0;
+  double least_error_ = 0, stripe_error_ = 0;
   unsigned raised_ = 0;
   std::array<Crossing, 64> crossings_;
   std::size_t count_ = 0;
