@@ -14,22 +14,26 @@
 #include "cli/stages.h"
 #include "core/error/error.h"
 #include "core/geodesy/sun.h"
-#include "core/memory/large_array.h"
 #include "core/skyline/crossing_kernels.h"
 #include "core/skyline/sky_view.h"
 #include "core/skyline/skyline.h"
+#include "tiles/layers/block_raster.h"
 #include "tiles/layers/geotiff.h"
 
 namespace scarp {
 namespace {
 
+static_assert(Skyline::kPartSide == BlockRaster::kSide);
+
 constexpr int kAzimuthsOfAll = 16;
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 
-/// Bytes a sample besides the output: the ground twice, its squares, an estimate.
-constexpr double kWorkBytesPerSample = 12;
-/// Of the output's bytes, with its overviews.
-constexpr double kBytesPerOutputByte = 1.4;
+/// Bytes a sample: the ground twice and its strips, with the padding of small ones.
+constexpr double kGroundBytes = 9.5;
+/// Of a band in work: its first overview.
+constexpr double kOverviewShare = 0.25;
+/// Of a raster of one band, which is packed in memory.
+constexpr double kPackedShare = 1.4;
 
 /// Wrong use shows before any work.
 void check_options(const HorizonOptions& options) {
@@ -40,7 +44,8 @@ void check_options(const HorizonOptions& options) {
                               "points; for one place give --at X,Y",
                               source));
   const bool wants_more = !options.distance_output.empty() || !options.sky_view_output.empty() ||
-                          !options.openness_output.empty();
+                          !options.openness_output.empty() ||
+                          !options.negative_openness_output.empty();
   if (options.output.empty() && !wants_more)
     throw Error(ErrorCode::kUsage,
                 "neither a place nor an output: --at X,Y[,H], or -o OUT.tif for all points, was "
@@ -59,7 +64,8 @@ void check_options(const HorizonOptions& options) {
                 "--sun makes the raster of -o and goes with --overwrite, --json and the options of "
                 "the surface; leave the others out");
   std::vector<std::string> outputs = {options.output, options.distance_output,
-                                      options.sky_view_output, options.openness_output};
+                                      options.sky_view_output, options.openness_output,
+                                      options.negative_openness_output};
   std::erase_if(outputs, [](const std::string& path) { return path.empty(); });
   std::sort(outputs.begin(), outputs.end());
   if (const auto twice = std::adjacent_find(outputs.begin(), outputs.end()); twice != outputs.end())
@@ -74,6 +80,9 @@ void check_options(const HorizonOptions& options) {
                               path));
 }
 
+/// TIFF counts bands in 16 bits.
+constexpr std::size_t kMostBands = 65'535;
+
 /// One run from options to finished rasters, a member function a stage.
 class AllHorizonsRun {
  public:
@@ -84,12 +93,14 @@ class AllHorizonsRun {
 
   int run() {
     check_options(options_);
+    check_bands();
     stages_.run("read", [&](const Progress& progress) { read(progress); });
     if (options_.sun_days) {
       stages_.run("shadow", [&](const Progress&) { shade(); });
       stages_.run("write", [&](const Progress&) { write_shadow(); });
     } else {
       check_memory();
+      open_outputs();
       stages_.run("look", [&](const Progress& progress) { look(progress); });
       stages_.run("write", [&](const Progress&) { write(); });
     }
@@ -121,65 +132,118 @@ class AllHorizonsRun {
 
   std::size_t bands_per_azimuth() const { return options_.estimate_only ? 1 : 3; }
 
+  void check_bands() const {
+    const std::size_t bands =
+        static_cast<std::size_t>(azimuths_) * (options_.output.empty() ? 1 : bands_per_azimuth());
+    const bool has_bands = !options_.output.empty() || !options_.distance_output.empty();
+    if (has_bands && bands > kMostBands)
+      throw Error(
+          ErrorCode::kUsage,
+          fmt::format("--azimuths {}: {} bands; at most {} were expected, which is what TIFF "
+                      "can hold; give fewer",
+                      azimuths_, bands, kMostBands));
+  }
+
   void check_memory() const {
-    const auto samples = static_cast<double>(samples_);
-    const double azimuths = azimuths_;
-    double output = 0;
+    double bytes = kGroundBytes;
     if (!options_.output.empty())
-      output += azimuths * static_cast<double>(bands_per_azimuth()) * sizeof(std::int16_t);
-    if (!options_.distance_output.empty()) output += azimuths * sizeof(float);
-    double bytes = kWorkBytesPerSample + kBytesPerOutputByte * output;
-    if (!options_.sky_view_output.empty()) bytes += kBytesPerOutputByte * sizeof(float);
-    if (!options_.openness_output.empty())
-      bytes += kBytesPerOutputByte * sizeof(float) + sizeof(std::uint16_t);
-    bytes *= samples;
+      bytes += kOverviewShare * static_cast<double>(bands_per_azimuth()) * sizeof(std::int16_t);
+    if (!options_.distance_output.empty()) bytes += kOverviewShare * sizeof(float);
+    if (!options_.sky_view_output.empty()) bytes += kPackedShare * sizeof(float);
+    if (!options_.openness_output.empty() || !options_.negative_openness_output.empty())
+      bytes += kPackedShare * sizeof(float) + sizeof(std::uint16_t);
+    bytes *= static_cast<double>(samples_);
     const auto budget = static_cast<double>(options_.common.memory_budget_bytes);
     if (bytes > budget)
       throw Error(ErrorCode::kResource,
-                  fmt::format("{} azimuths of {} samples: about {:.1f} GiB of memory were needed, "
-                              "{:.1f} GiB are allowed; give fewer --azimuths, --estimate-only, a "
-                              "part of the DEM or more --memory",
-                              azimuths_, samples_, bytes / 0x1p30, budget / 0x1p30));
+                  fmt::format("{} samples: about {:.2f} GiB of memory were needed, {:.2f} GiB are "
+                              "allowed; give fewer outputs, a part of the DEM or more --memory",
+                              samples_, bytes / 0x1p30, budget / 0x1p30));
   }
 
   double azimuth_deg(std::size_t i) const { return 360.0 * static_cast<double>(i) / azimuths_; }
 
+  /// What grows on the disk. Missing folders and too little room show here.
+  void open_outputs() {
+    if (!options_.output.empty()) horizons_.emplace(options_.output, horizon_layer(), existing());
+    if (!options_.distance_output.empty())
+      distances_.emplace(options_.distance_output, distance_layer(), existing());
+  }
+
   void look(const Progress& progress) {
-    const auto azimuths = static_cast<std::size_t>(azimuths_);
+    const bool wants_down = !options_.negative_openness_output.empty();
+    const bool wants_up = !options_.output.empty() || !options_.distance_output.empty() ||
+                          !options_.sky_view_output.empty() || !options_.openness_output.empty();
+    const double passes = (wants_up ? 1 : 0) + (wants_down ? 1 : 0);
+    const auto part_of = [&](double from) {
+      return [&progress, from, passes](double share) {
+        if (progress) progress((from + share) / passes);
+      };
+    };
+    if (wants_up) {
+      if (!options_.sky_view_output.empty() || !options_.openness_output.empty())
+        sky_.emplace(ground_.grid.columns(), ground_.grid.rows(), !options_.sky_view_output.empty(),
+                     !options_.openness_output.empty());
+      look_up(part_of(0));
+    }
+    if (!wants_down) return;
+    nadir_.emplace(ground_.grid.columns(), ground_.grid.rows(), false, true);
+    look_down(part_of(wants_up ? 1 : 0));
+  }
+
+  SkylineOptions skyline_options(Sight sight) const {
     SkylineOptions look;
     look.eye_height_m = options_.eye_height_m;
     look.tolerance_rad = options_.tolerance_deg * kRadiansPerDegree;
-    Skyline skyline(ground_.grid, earth_, look);
-    const bool keeps = !options_.output.empty();
-    const std::size_t per_azimuth = bands_per_azimuth();
-    if (keeps) bands_ = LargeArray<std::int16_t>(samples_ * per_azimuth * azimuths);
-    if (!options_.distance_output.empty()) distances_m_ = LargeArray<float>(samples_ * azimuths);
-    if (!options_.sky_view_output.empty() || !options_.openness_output.empty())
-      sky_.emplace(samples_, !options_.sky_view_output.empty(), !options_.openness_output.empty());
-    // An estimate that is not kept is written over with every azimuth.
-    LargeArray<std::int16_t> spare(keeps ? 0 : samples_);
-    const auto band = [&](std::size_t azimuth, std::size_t which) {
-      if (!keeps) return which == 0 ? spare.span() : std::span<std::int16_t>();
-      if (which >= per_azimuth) return std::span<std::int16_t>();
-      return bands_.span().subspan((azimuth * per_azimuth + which) * samples_, samples_);
-    };
-    std::size_t done = 0;
+    look.sight = sight;
+    return look;
+  }
+
+  /// Azimuth by azimuth; parts go to their places in the outputs as they are found.
+  void look_up(const Progress& progress) {
+    Skyline skyline(ground_.grid, earth_, skyline_options(Sight::kUp));
+    double done = 0;
     for (const std::size_t i : in_order(skyline)) {
-      const SkylineBands bands{band(i, 0), band(i, 1), band(i, 2),
-                               options_.distance_output.empty()
-                                   ? std::span<float>()
-                                   : distances_m_.span().subspan(i * samples_, samples_)};
-      skyline.look(fixed_azimuth(azimuth_deg(i) * kRadiansPerDegree), bands);
-      if (sky_) sky_->add(bands.estimate);
-      if (progress) progress(static_cast<double>(++done) / static_cast<double>(azimuths));
+      const std::size_t kinds = horizons_ ? bands_per_azimuth() : 0;
+      for (std::size_t kind = 0; kind < kinds; ++kind) horizons_->begin(i * kinds + kind);
+      if (distances_) distances_->begin(i);
+      if (sky_) sky_->begin_azimuth();
+      skyline.look(azimuth(i), distances_.has_value(), [&](const SkylinePart& part) {
+        const auto write = [&](BlockRaster& to, std::size_t band, const auto& samples) {
+          to.write(band, part.first_column, part.first_row, part.columns, part.rows,
+                   std::as_bytes(samples));
+        };
+        const std::array kind_samples = {part.estimate, part.lower, part.upper};
+        for (std::size_t kind = 0; kind < kinds; ++kind)
+          write(*horizons_, i * kinds + kind, kind_samples[kind]);
+        if (distances_) write(*distances_, i, part.distance_m);
+        if (sky_) sky_->add(part);
+      });
+      if (horizons_) horizons_->finish(i * kinds, kinds);
+      if (distances_) distances_->finish(i, 1);
+      progress(++done / azimuths_);
     }
+  }
+
+  void look_down(const Progress& progress) {
+    Skyline skyline(ground_.grid, earth_, skyline_options(Sight::kDown));
+    double done = 0;
+    for (const std::size_t i : in_order(skyline)) {
+      nadir_->begin_azimuth();
+      skyline.look(azimuth(i), false, [&](const SkylinePart& part) { nadir_->add(part); });
+      progress(++done / azimuths_);
+    }
+  }
+
+  AzimuthAt azimuth(std::size_t i) const {
+    return fixed_azimuth(azimuth_deg(i) * kRadiansPerDegree);
   }
 
   /// Azimuths that march alike one after the other.
   std::vector<std::size_t> in_order(const Skyline& skyline) const {
     std::vector<std::size_t> order, later;
     for (std::size_t i = 0; i < static_cast<std::size_t>(azimuths_); ++i) {
-      const March march = skyline.march_for(fixed_azimuth(azimuth_deg(i) * kRadiansPerDegree));
+      const March march = skyline.march_for(azimuth(i));
       (march == March::kOverRows ? order : later).push_back(i);
     }
     order.insert(order.end(), later.begin(), later.end());
@@ -195,41 +259,42 @@ class AllHorizonsRun {
     return options_.common.overwrite ? Existing::kReplace : Existing::kRefuse;
   }
 
+  RasterLayer horizon_layer() const {
+    static constexpr std::array<const char*, 3> kKinds = {"estimate", "lower", "upper"};
+    const auto name = [&](std::size_t i) {
+      return fmt::format("azimuth {:.10g} {}", azimuth_deg(i / bands_per_azimuth()),
+                         kKinds[i % bands_per_azimuth()]);
+    };
+    const std::span<const std::int16_t> none;
+    RasterLayer layer = layer_over(ground_.dem, none, name(0));
+    const std::size_t bands = static_cast<std::size_t>(azimuths_) * bands_per_azimuth();
+    for (std::size_t i = 1; i < bands; ++i) layer.more_bands.push_back({name(i), none});
+    layer.unit = "degree";
+    layer.scale = 0.01;
+    layer.nodata = kUnknownElevation;
+    layer.metadata["VALUES"] =
+        "elevation of the horizon above the level plane of the eye, steps of 0.01 degree; -9000 "
+        "no ground that way; -32768 unknown";
+    add_metadata(layer);
+    return layer;
+  }
+
+  RasterLayer distance_layer() const {
+    const auto name = [&](std::size_t i) { return fmt::format("azimuth {:.10g}", azimuth_deg(i)); };
+    const std::span<const float> none;
+    RasterLayer layer = layer_over(ground_.dem, none, name(0));
+    for (std::size_t i = 1; i < static_cast<std::size_t>(azimuths_); ++i)
+      layer.more_bands.push_back({name(i), none});
+    layer.unit = "m";
+    layer.nodata = std::numeric_limits<double>::quiet_NaN();
+    layer.metadata["VALUES"] = "distance of the estimated horizon along the ground; NaN unknown";
+    add_metadata(layer);
+    return layer;
+  }
+
   void write() {
-    const auto azimuths = static_cast<std::size_t>(azimuths_);
-    if (!options_.output.empty()) {
-      const std::span<const std::int16_t> all = bands_.span();
-      const auto band = [&](std::size_t i) { return all.subspan(i * samples_, samples_); };
-      static constexpr std::array<const char*, 3> kKinds = {"estimate", "lower", "upper"};
-      const auto name = [&](std::size_t i) {
-        return fmt::format("azimuth {:.10g} {}", azimuth_deg(i / bands_per_azimuth()),
-                           kKinds[i % bands_per_azimuth()]);
-      };
-      RasterLayer layer = layer_over(ground_.dem, band(0), name(0));
-      for (std::size_t i = 1; i < azimuths * bands_per_azimuth(); ++i)
-        layer.more_bands.push_back({name(i), band(i)});
-      layer.unit = "degree";
-      layer.scale = 0.01;
-      layer.nodata = kUnknownElevation;
-      layer.is_bulky = true;
-      layer.metadata["VALUES"] =
-          "elevation of the horizon above the level plane of the eye, steps of 0.01 degree; -9000 "
-          "no ground that way; -32768 unknown";
-      write_layer(options_.output, layer);
-    }
-    if (!options_.distance_output.empty()) {
-      const std::span<const float> all = distances_m_.span();
-      const auto name = [&](std::size_t i) {
-        return fmt::format("azimuth {:.10g}", azimuth_deg(i));
-      };
-      RasterLayer layer = layer_over(ground_.dem, all.first(samples_), name(0));
-      for (std::size_t i = 1; i < azimuths; ++i)
-        layer.more_bands.push_back({name(i), all.subspan(i * samples_, samples_)});
-      layer.unit = "m";
-      layer.is_bulky = true;
-      write_floats(options_.distance_output, layer,
-                   "distance of the estimated horizon along the ground");
-    }
+    if (horizons_) horizons_->commit();
+    if (distances_) distances_->commit();
     if (!options_.sky_view_output.empty()) {
       RasterLayer layer = layer_over(ground_.dem, sky_->sky_view(), "sky view factor");
       write_floats(options_.sky_view_output, layer,
@@ -242,6 +307,13 @@ class AllHorizonsRun {
       write_floats(options_.openness_output, layer,
                    "positive openness: mean zenith angle of the horizon (Yokoyama et al. 2002), no "
                    "limit of distance");
+    }
+    if (nadir_) {
+      RasterLayer layer = layer_over(ground_.dem, nadir_->openness_deg(), "negative openness");
+      layer.unit = "degree";
+      write_floats(options_.negative_openness_output, layer,
+                   "negative openness: mean nadir angle of the ground seen lowest (Yokoyama et al. "
+                   "2002), no limit of distance");
     }
   }
 
@@ -273,6 +345,11 @@ class AllHorizonsRun {
 
   /// With what the run was, for whoever opens the raster.
   void write_layer(const std::string& path, RasterLayer& layer) const {
+    add_metadata(layer);
+    write_geotiff_cog(path, layer, existing());
+  }
+
+  void add_metadata(RasterLayer& layer) const {
     const FrameDescription& frame = ground_.dem.frame->description();
     std::map<std::string, std::string>& metadata = layer.metadata;
     metadata["SURFACE"] = "grid";
@@ -288,7 +365,6 @@ class AllHorizonsRun {
       metadata["EYE_HEIGHT_M"] = fmt::format("{:g}", options_.eye_height_m);
       metadata["TOLERANCE_DEG"] = fmt::format("{:g}", options_.tolerance_deg);
     }
-    write_geotiff_cog(path, layer, existing());
   }
 
   nlohmann::json summary() const {
@@ -309,7 +385,8 @@ class AllHorizonsRun {
     for (const auto& [name, path] :
          {std::pair("output", options_.output), std::pair("distance", options_.distance_output),
           std::pair("sky_view", options_.sky_view_output),
-          std::pair("openness", options_.openness_output)})
+          std::pair("openness", options_.openness_output),
+          std::pair("negative_openness", options_.negative_openness_output)})
       if (!path.empty()) result[name] = path;
     for (const StageCost& cost : stages_.costs())
       result["stages"].push_back(
@@ -335,7 +412,8 @@ class AllHorizonsRun {
     for (const auto& [path, what] :
          {std::pair(options_.output, "horizons"), std::pair(options_.distance_output, "distances"),
           std::pair(options_.sky_view_output, "sky view factors"),
-          std::pair(options_.openness_output, "openness")})
+          std::pair(options_.openness_output, "openness"),
+          std::pair(options_.negative_openness_output, "negative openness")})
       if (!path.empty())
         fmt::print("{}: {} of {} samples in {} directions\n", path, what, samples_, azimuths_);
   }
@@ -346,9 +424,9 @@ class AllHorizonsRun {
   Ground ground_;
   std::size_t samples_ = 0;
   std::optional<EarthFrame> earth_;
-  LargeArray<std::int16_t> bands_;  ///< azimuth by azimuth: estimate, lower, upper
-  LargeArray<float> distances_m_;
-  std::optional<SkyView> sky_;
+  std::optional<BlockRaster> horizons_;  ///< azimuth by azimuth: estimate, lower, upper
+  std::optional<BlockRaster> distances_;
+  std::optional<SkyView> sky_, nadir_;
   std::vector<Sunlight> light_;
   std::size_t judged_ = 0;
 };

@@ -248,6 +248,8 @@ void add_all_horizons(CLI::App& command, HorizonOptions& o) {
   command.add_option("--sky-view", o.sky_view_output, "All points: a raster of sky view factors");
   command.add_option("--openness", o.openness_output,
                      "All points: a raster of positive openness, degrees");
+  command.add_option("--negative-openness", o.negative_openness_output,
+                     "All points: a raster of negative openness, degrees");
   command.add_option_function<std::string>(
       "--sun",
       [&o](const std::string& text) {

@@ -119,6 +119,7 @@ void check_place_options(const HorizonOptions& options) {
   refuse(!options.distance_output.empty(), "--distance");
   refuse(!options.sky_view_output.empty(), "--sky-view");
   refuse(!options.openness_output.empty(), "--openness");
+  refuse(!options.negative_openness_output.empty(), "--negative-openness");
   refuse(options.sun_days.has_value(), "--sun");
 }
 

@@ -126,7 +126,7 @@ struct HorizonOptions {
   double eye_height_m = 0;
   double tolerance_deg = 0.3;
   bool estimate_only = false;
-  std::string distance_output, sky_view_output, openness_output;
+  std::string distance_output, sky_view_output, openness_output, negative_openness_output;
   std::optional<double> sun_days;  ///< since 2000-01-01T12:00 UTC
   std::string sun_text;            ///< as typed
 

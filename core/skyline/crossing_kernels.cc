@@ -4,6 +4,8 @@
 // After foreach_target.h, which includes this file once more for each instruction set.
 #include <hwy/highway.h>
 
+#include <bit>
+
 #include "core/skyline/crossing_kernels.h"
 #include "core/skyline/march_ground.h"
 
@@ -32,50 +34,84 @@ HWY_INLINE bool takes_part(unsigned groups, std::size_t ray) {
   return (groups >> (ray / kGroup) & 1) != 0;
 }
 
-void meet_now(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift, unsigned groups,
-              RayBundle& rays) {
-  for (std::size_t ray = 0; ray < kBundle; ray += hn::Lanes(kTag)) {
-    if (!takes_part(groups, ray)) continue;
-    Vector greatest = hn::Load(kTag, rays.slope + ray), error = hn::Load(kTag, rays.error + ray);
+/// @tparam kFans  places and runs differ from ray to ray
+template <bool kError, bool kDistance, bool kFans>
+HWY_INLINE unsigned meet_noting(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift,
+                                unsigned groups, RayBundle& rays) {
+  unsigned raised = 0;
+  const std::size_t lanes = hn::Lanes(kTag), parts = kGroup / lanes;
+  for (std::size_t part = 0; groups != 0; part = part + 1 == parts ? 0 : part + 1) {
+    const std::size_t ray =
+        static_cast<std::size_t>(std::countr_zero(groups)) * kGroup + part * lanes;
+    if (part + 1 == parts) groups &= groups - 1;
+    const Vector before = hn::Load(kTag, rays.slope + ray);
     const Vector eye = hn::Load(kTag, rays.eye_z + ray);
     const Vector number = hn::Iota(kTag, static_cast<float>(ray));
+    Vector greatest = before, error = hn::Load(kTag, rays.error + ray);
+    Vector run = hn::Load(kTag, rays.slope_run + ray);
     for (std::size_t i = 0; i < count; ++i) {
       const Crossing& c = crossings[i];
       const Vector a = hn::LoadU(kTag, c.a + shift + ray);
       const Vector difference = hn::LoadU(kTag, c.b + shift + ray) - a;
-      const Vector share = value(c.share) + value(c.share_step) * number;
-      const Vector inverse = value(c.inverse_run) + value(c.inverse_run_step) * number;
-      greatest = hn::Max(greatest, ((a - eye) + share * difference) * inverse);
-      error = hn::Max(error, steepness(difference) * value(c.slack));
+      Vector share = value(c.share), inverse = value(c.inverse_run);
+      if constexpr (kFans) {
+        share = share + value(c.share_step) * number;
+        inverse = inverse + value(c.inverse_run_step) * number;
+      }
+      const Vector slope = ((a - eye) + share * difference) * inverse;
+      if constexpr (kDistance)
+        run = hn::IfThenElse(greatest < slope, value(1 / c.inverse_run), run);
+      greatest = hn::Max(greatest, slope);
+      if constexpr (kError) error = hn::Max(error, steepness(difference) * value(c.slack));
     }
+    if (!hn::AllFalse(kTag, before < greatest)) raised |= 1U << (ray / kGroup);
     hn::Store(greatest, kTag, rays.slope + ray);
-    hn::Store(error, kTag, rays.error + ray);
+    if constexpr (kError) hn::Store(error, kTag, rays.error + ray);
+    if constexpr (kDistance) hn::Store(run, kTag, rays.slope_run + ray);
   }
+  return raised;
 }
 
-void meet_and_measure_now(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift,
+unsigned meet_now(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift,
+                  unsigned groups, const MeetNotes& notes, RayBundle& rays) {
+  if (notes.distance) return meet_noting<true, true, true>(crossings, count, shift, groups, rays);
+  if (notes.error)
+    return notes.fans ? meet_noting<true, false, true>(crossings, count, shift, groups, rays)
+                      : meet_noting<true, false, false>(crossings, count, shift, groups, rays);
+  return notes.fans ? meet_noting<false, false, true>(crossings, count, shift, groups, rays)
+                    : meet_noting<false, false, false>(crossings, count, shift, groups, rays);
+}
+
+unsigned meet_samples_now(const SampleCrossing* crossings, std::size_t count, std::ptrdiff_t shift,
                           unsigned groups, RayBundle& rays) {
+  const Vector none = value(MarchGround::kNothing), bound = value(kGroundBound);
+  unsigned raised = 0;
   for (std::size_t ray = 0; ray < kBundle; ray += hn::Lanes(kTag)) {
     if (!takes_part(groups, ray)) continue;
-    Vector greatest = hn::Load(kTag, rays.slope + ray), error = hn::Load(kTag, rays.error + ray);
-    Vector run = hn::Load(kTag, rays.slope_run + ray);
+    const Vector before = hn::Load(kTag, rays.slope + ray);
     const Vector eye = hn::Load(kTag, rays.eye_z + ray);
-    const Vector number = hn::Iota(kTag, static_cast<float>(ray));
+    Vector greatest = before, high = hn::Load(kTag, rays.high + ray);
+    Vector slope_run = hn::Load(kTag, rays.slope_run + ray), run = hn::Load(kTag, rays.run + ray);
     for (std::size_t i = 0; i < count; ++i) {
-      const Crossing& c = crossings[i];
-      const Vector a = hn::LoadU(kTag, c.a + shift + ray);
-      const Vector difference = hn::LoadU(kTag, c.b + shift + ray) - a;
-      const Vector share = value(c.share) + value(c.share_step) * number;
-      const Vector inverse = value(c.inverse_run) + value(c.inverse_run_step) * number;
-      const Vector slope = ((a - eye) + share * difference) * inverse;
-      run = hn::IfThenElse(greatest < slope, value(1 / c.inverse_run), run);
-      greatest = hn::Max(greatest, slope);
-      error = hn::Max(error, steepness(difference) * value(c.slack));
+      const SampleCrossing& c = crossings[i];
+      const float* z = c.z + shift + ray;
+      const Vector slope = (hn::LoadU(kTag, z) - eye) * value(c.inverse_run);
+      const Mask sure = hn::Min(hn::LoadU(kTag, z - 1), hn::LoadU(kTag, z + 1)) > bound;
+      const Vector met = hn::IfThenElse(sure, slope, none);
+      const Vector may = hn::IfThenElse(sure, none, slope + value(c.error));
+      const Vector run_m = value(1 / c.inverse_run);
+      slope_run = hn::IfThenElse(greatest < met, run_m, slope_run);
+      run = hn::IfThenElse(high < may, run_m, run);
+      greatest = hn::Max(greatest, met);
+      high = hn::Max(high, may);
     }
-    hn::Store(run, kTag, rays.slope_run + ray);
+    if (!hn::AllFalse(kTag, before < greatest)) raised |= 1U << (ray / kGroup);
     hn::Store(greatest, kTag, rays.slope + ray);
-    hn::Store(error, kTag, rays.error + ray);
+    hn::Store(slope_run, kTag, rays.slope_run + ray);
+    hn::Store(high, kTag, rays.high + ray);
+    hn::Store(run, kTag, rays.run + ray);
   }
+  return raised;
 }
 
 void meet_high_now(const PossibleCrossing& c, unsigned groups, RayBundle& rays) {
@@ -102,9 +138,10 @@ void meet_high_now(const PossibleCrossing& c, unsigned groups, RayBundle& rays) 
   }
 }
 
-void meet_loosely_now(const LooseCrossing& c, RayBundle& rays) {
+unsigned meet_loosely_now(const LooseCrossing& c, RayBundle& rays) {
   const Vector none = value(MarchGround::kNothing), bound = value(kGroundBound);
   const Vector zero = hn::Zero(kTag);
+  unsigned raised = 0;
   const std::size_t lanes = hn::Lanes(kTag);
   const auto end = static_cast<std::size_t>(c.end_ray);
   for (std::size_t ray = static_cast<std::size_t>(c.first_ray) / lanes * lanes; ray < end;
@@ -137,34 +174,69 @@ void meet_loosely_now(const LooseCrossing& c, RayBundle& rays) {
     const Vector high = hn::Load(kTag, rays.high + ray);
     hn::Store(hn::IfThenElse(high < most, value(1 / c.inverse_run), hn::Load(kTag, rays.run + ray)),
               kTag, rays.run + ray);
-    hn::Store(hn::Max(hn::Load(kTag, rays.low + ray), least), kTag, rays.low + ray);
+    const Vector low = hn::Load(kTag, rays.low + ray);
+    if (!hn::AllFalse(kTag, low < least)) raised |= 1U << (ray / kGroup);
+    hn::Store(hn::Max(low, least), kTag, rays.low + ray);
     hn::Store(hn::Max(high, most), kTag, rays.high + ray);
   }
+  return raised;
 }
 
-unsigned may_block_now(const Square& square, float tolerance, unsigned groups, RayBundle& rays) {
-  unsigned open = 0;
-  alignas(64) float raised[kBundle];
-  const std::size_t lanes = hn::Lanes(kTag);
-  for (std::size_t ray = 0; ray < kBundle; ray += lanes) {
-    if (!takes_part(groups, ray)) continue;
-    Vector most = hn::LoadU(kTag, square.highest[0] + ray);
-    for (int i = 1; i < square.count; ++i)
-      most = hn::Max(most, hn::LoadU(kTag, square.highest[i] + ray));
-    const Vector rise = most - hn::Load(kTag, rays.eye_z + ray);
-    const Vector slope =
-        hn::Max(rise * value(square.inverse_near), rise * value(square.inverse_far));
-    const Vector least =
-        hn::Max(hn::Max(hn::Load(kTag, rays.low + ray), hn::Load(kTag, rays.slope + ray)) +
-                    value(tolerance),
-                value(RayBundle::kNone));
-    hn::Store(hn::Max(hn::Load(kTag, rays.rest + ray), slope), kTag, raised + ray);
-    if (!hn::AllFalse(kTag, slope > least)) open |= 1U << (ray / kGroup);
+/// The steepest that rays can see the ground of a square.
+HWY_INLINE Vector steepest(const Square& square, std::size_t ray, Vector eye) {
+  Vector most = hn::LoadU(kTag, square.highest[0] + ray);
+  for (int i = 1; i < square.count; ++i)
+    most = hn::Max(most, hn::LoadU(kTag, square.highest[i] + ray));
+  const Vector rise = most - eye;
+  return hn::Max(rise * value(square.inverse_near), rise * value(square.inverse_far));
+}
+
+/// Above this ground might block.
+HWY_INLINE Vector least_to_block(const RayBundle& rays, std::size_t ray, float tolerance) {
+  const Vector met = hn::Max(hn::Load(kTag, rays.low + ray), hn::Load(kTag, rays.slope + ray));
+  return hn::Max(met + value(tolerance), value(RayBundle::kNone));
+}
+
+/// A group that fits into one vector, without branches.
+HWY_INLINE void ask_vector(const Square* squares, std::size_t count, float tolerance,
+                           std::size_t ray, RayBundle& rays, unsigned* open) {
+  // What is left out of a group that stays closed, and of one that is opened.
+  static constexpr float kMostRest[] = {1e30F, -1e30F};
+  const Vector eye = hn::Load(kTag, rays.eye_z + ray);
+  const Vector least = least_to_block(rays, ray, tolerance);
+  Vector rest = hn::Load(kTag, rays.rest + ray);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vector slope = steepest(squares[i], ray, eye);
+    const unsigned is_open = hn::AllFalse(kTag, slope > least) ? 0 : 1;
+    rest = hn::Max(rest, hn::Min(slope, value(kMostRest[is_open])));
+    open[i] |= is_open << (ray / kGroup);
   }
-  for (std::size_t ray = 0; ray < kBundle; ray += lanes)
-    if (takes_part(groups & ~open, ray))
-      hn::Store(hn::Load(kTag, raised + ray), kTag, rays.rest + ray);
-  return open;
+  hn::Store(rest, kTag, rays.rest + ray);
+}
+
+void may_block_now(const Square* squares, std::size_t count, float tolerance, unsigned groups,
+                   RayBundle& rays, unsigned* open) {
+  for (std::size_t i = 0; i < count; ++i) open[i] = 0;
+  const std::size_t lanes = hn::Lanes(kTag);
+  for (; groups != 0; groups &= groups - 1) {
+    const std::size_t first = static_cast<std::size_t>(std::countr_zero(groups)) * kGroup;
+    if (lanes == kGroup) {
+      ask_vector(squares, count, tolerance, first, rays, open);
+      continue;
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      bool is_open = false;
+      for (std::size_t ray = first; ray < first + kGroup && !is_open; ray += lanes) {
+        const Vector slope = steepest(squares[i], ray, hn::Load(kTag, rays.eye_z + ray));
+        is_open = !hn::AllFalse(kTag, slope > least_to_block(rays, ray, tolerance));
+      }
+      open[i] |= (is_open ? 1U : 0U) << (first / kGroup);
+      for (std::size_t ray = first; ray < first + kGroup && !is_open; ray += lanes) {
+        const Vector slope = steepest(squares[i], ray, hn::Load(kTag, rays.eye_z + ray));
+        hn::Store(hn::Max(hn::Load(kTag, rays.rest + ray), slope), kTag, rays.rest + ray);
+      }
+    }
+  }
 }
 
 /// Known ground and void that rays meet, in this order.
@@ -235,6 +307,15 @@ HWY_INLINE Vector arc_tangent_steps(Vector x) {
   return hn::CopySign((base + p) * value(5729.577951F), x);
 }
 
+/// Never below what the angles of two tangents differ by, steps of 0.01 degree, and little above:
+/// the angle grows no faster than where the tangent between them is nearest to 0. 0 where b < a.
+HWY_INLINE Vector steps_between(Vector a, Vector b) {
+  const Vector zero = hn::Zero(kTag);
+  const Vector nearest = hn::Max(hn::Max(a, zero - b), zero);
+  const Vector difference = hn::Max(b - a, zero);
+  return difference * value(5729.58F * (1 + 1e-6F)) / (value(1) + nearest * nearest);
+}
+
 void elevations_now(const ElevationRow& k, const RayBundle& rays, std::int16_t* estimate,
                     std::int16_t* lower, std::int16_t* upper) {
   constexpr float kRounding = 0.02F;  // of the steps: floats up to 9000, and the polynomial
@@ -256,11 +337,15 @@ void elevations_now(const ElevationRow& k, const RayBundle& rays, std::int16_t* 
     const Vector rise = value(k.rise) + number * value(k.rise_step) + z * value(k.rise_z);
     const Vector shrink = value(k.shrink) + number * value(k.shrink_step);
     const Vector slope = hn::Load(kTag, rays.slope + i);
-    const Vector error = hn::Load(kTag, rays.error + i) + hn::Abs(slope) * value(k.drift);
+    const Vector error = hn::Max(hn::Load(kTag, rays.error + i), value(k.least_error)) +
+                         hn::Abs(slope) * value(k.drift);
     const Vector ray_low = hn::Max(hn::Load(kTag, rays.low + i), slope - error);
     const Vector loose_high = hn::Load(kTag, rays.high + i);
-    const Vector ray_high = hn::Max(loose_high, slope + error);
-    const Vector most = hn::Max(ray_high, hn::Load(kTag, rays.rest + i));
+    const Vector ray_high =
+        hn::Max(loose_high + hn::Abs(loose_high) * value(k.drift), slope + error);
+    const Vector rest = hn::Load(kTag, rays.rest + i);
+    const Vector most =
+        hn::Max(ray_high, rest + hn::Abs(rest) * value(k.drift) + value(k.least_error));
     const Mask met = most > none, met_low = ray_low > none;
     const Vector low = clamped(ray_low * shrink - value(k.slope_error));
     const Vector high = clamped(most * shrink + value(k.slope_error));
@@ -270,14 +355,17 @@ void elevations_now(const ElevationRow& k, const RayBundle& rays, std::int16_t* 
     const auto tangent = [&](Vector s) { return level + s * (rise + s * value(k.bend)); };
     const Vector low_tangent = tangent(low) - value(k.error) * (one + low * low);
     const Vector high_tangent = tangent(high) + value(k.error) * (one + high * high);
-    Vector least = hn::Floor(arc_tangent_steps(low_tangent) - value(kRounding));
-    Vector greatest = hn::Ceil(arc_tangent_steps(high_tangent) + value(kRounding));
+    const Vector middle_tangent = tangent(middle), middle_steps = arc_tangent_steps(middle_tangent);
+    const Vector below = steps_between(low_tangent, middle_tangent);
+    const Vector above = steps_between(middle_tangent, high_tangent);
+    Vector least = hn::Floor(middle_steps - below - value(kRounding));
+    Vector greatest = hn::Ceil(middle_steps + above + value(kRounding));
     least = hn::IfThenElse(hn::Abs(low) > value(kSteep), least - value(kSteepAllowance), least);
     greatest =
         hn::IfThenElse(hn::Abs(high) > value(kSteep), greatest + value(kSteepAllowance), greatest);
     least = hn::IfThenElse(met_low, hn::Max(least, value(-9000)), value(-9000));
     greatest = hn::Min(greatest, value(9000));
-    const Vector nearest = hn::Floor(arc_tangent_steps(tangent(middle)) + value(0.5F));
+    const Vector nearest = hn::Floor(middle_steps + value(0.5F));
     const Vector best = hn::Min(hn::Max(nearest, least), greatest);
     const Vector nothing = value(kNothingSeen);
     write(hn::IfThenElse(met, best, nothing), estimate + i);
@@ -294,7 +382,7 @@ HWY_AFTER_NAMESPACE();
 namespace scarp {
 
 HWY_EXPORT(meet_now);
-HWY_EXPORT(meet_and_measure_now);
+HWY_EXPORT(meet_samples_now);
 HWY_EXPORT(meet_high_now);
 HWY_EXPORT(meet_loosely_now);
 HWY_EXPORT(may_block_now);
@@ -303,31 +391,33 @@ HWY_EXPORT(note_void_now);
 HWY_EXPORT(note_void_loosely_now);
 HWY_EXPORT(note_ground_behind_now);
 
-void meet(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift, unsigned groups,
-          RayBundle& rays) {
-  HWY_DYNAMIC_DISPATCH(meet_now)(crossings, count, shift, groups, rays);
+unsigned meet(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift, unsigned groups,
+              const MeetNotes& notes, RayBundle& rays) {
+  return HWY_DYNAMIC_DISPATCH(meet_now)(crossings, count, shift, groups, notes, rays);
 }
 
-void meet_and_measure(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift,
+unsigned meet_samples(const SampleCrossing* crossings, std::size_t count, std::ptrdiff_t shift,
                       unsigned groups, RayBundle& rays) {
-  HWY_DYNAMIC_DISPATCH(meet_and_measure_now)(crossings, count, shift, groups, rays);
+  return HWY_DYNAMIC_DISPATCH(meet_samples_now)(crossings, count, shift, groups, rays);
 }
 
 void meet_high(const PossibleCrossing& crossing, unsigned groups, RayBundle& rays) {
   HWY_DYNAMIC_DISPATCH(meet_high_now)(crossing, groups, rays);
 }
 
-void meet_loosely(const LooseCrossing& crossing, RayBundle& rays) {
-  HWY_DYNAMIC_DISPATCH(meet_loosely_now)(crossing, rays);
+unsigned meet_loosely(const LooseCrossing& crossing, RayBundle& rays) {
+  return HWY_DYNAMIC_DISPATCH(meet_loosely_now)(crossing, rays);
 }
 
-unsigned may_block(const Square& square, float tolerance, unsigned groups, RayBundle& rays) {
-  return HWY_DYNAMIC_DISPATCH(may_block_now)(square, tolerance, groups, rays);
+void may_block(const Square* squares, std::size_t count, float tolerance, unsigned groups,
+               RayBundle& rays, unsigned* open) {
+  HWY_DYNAMIC_DISPATCH(may_block_now)(squares, count, tolerance, groups, rays, open);
 }
 
 void elevations(const ElevationRow& row, const RayBundle& rays, std::int16_t* estimate,
                 std::int16_t* lower, std::int16_t* upper) {
   HWY_DYNAMIC_DISPATCH(elevations_now)(row, rays, estimate, lower, upper);
+  if (!row.has_unknown) return;
   for (int i = 0; i < kBundle; ++i)
     if (rays.void_before[i] > 0) estimate[i] = lower[i] = upper[i] = kUnknownElevation;
 }

@@ -41,14 +41,30 @@ struct Crossing {
   float slack;                          ///< share's error times inverse_run
 };
 
-/// Compares rays with segments: slope and error rise.
+/// What a comparison does besides raising slopes.
+struct MeetNotes {
+  bool error = true;      ///< raises `error`; else the caller knows a bound of it
+  bool distance = false;  ///< notes slope_run
+  bool fans = true;       ///< places or runs differ from ray to ray
+};
+
+/// Compares rays with segments.
 /// @param shift   added to all samples
 /// @param groups  bit g: the rays of group g take part
-void meet(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift, unsigned groups,
-          RayBundle& rays);
+/// @return the groups of which a slope rose
+unsigned meet(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift, unsigned groups,
+              const MeetNotes& notes, RayBundle& rays);
 
-/// The same and notes slope_run. Cost: 1.3 times as much.
-void meet_and_measure(const Crossing* crossings, std::size_t count, std::ptrdiff_t shift,
+/// A line that all rays cross so near to a sample that it does not matter on which side.
+struct SampleCrossing {
+  const float* z;     ///< of the bundle's first lane
+  float inverse_run;  ///< 1 / metres
+  float error;        ///< of the slope, where ground is steepest
+};
+/// Raises slope where the samples on both sides are known, and else high: the ray may pass on the
+/// side where there is nothing.
+/// @return the groups of which a slope rose
+unsigned meet_samples(const SampleCrossing* crossings, std::size_t count, std::ptrdiff_t shift,
                       unsigned groups, RayBundle& rays);
 
 /// A segment that rays may cross, at a share known within `reach`, or not at all.
@@ -70,7 +86,9 @@ struct LooseCrossing {
   float reach;              ///< the place's error, lanes
   float inverse_run;        ///< 1 / metres
 };
-void meet_loosely(const LooseCrossing& crossing, RayBundle& rays);
+/// Raises low and high.
+/// @return the groups of which a low rose
+unsigned meet_loosely(const LooseCrossing& crossing, RayBundle& rays);
 
 /// Notes void on segments and known ground behind it. Call in order along the rays.
 void note_void(const float* a, const float* b, unsigned groups, RayBundle& rays);
@@ -85,8 +103,10 @@ struct Square {
 
 /// Which groups have a ray that the ground might block more than `tolerance` above what it has met?
 /// The others' `rest` rises to what the ground can do.
-/// @param groups  that are asked
-unsigned may_block(const Square& square, float tolerance, unsigned groups, RayBundle& rays);
+/// @param groups     that are asked
+/// @param open[out]  [count]
+void may_block(const Square* squares, std::size_t count, float tolerance, unsigned groups,
+               RayBundle& rays, unsigned* open);
 
 /// Rays that have met void see known ground in the square.
 void note_ground_behind(const Square& square, unsigned groups, RayBundle& rays);
@@ -100,7 +120,9 @@ struct ElevationRow {
   float shrink, shrink_step;  ///< slopes are multiplied by shrink + i shrink_step
   float error;                ///< tangent_error
   float slope_error;          ///< of the heights' rounding
+  float least_error;          ///< of crossings that were not measured
   float drift;                ///< relative error of the runs at certain crossings
+  bool has_unknown;           ///< some rays have no eye, or there is void
 };
 
 /// Elevation in steps of 0.01 degree from slopes, rounded down and up.

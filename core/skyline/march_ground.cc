@@ -13,42 +13,67 @@ inline float greater(float a, float b) {
   return a < b ? b : a;
 }
 
-/// to[i] = the greatest of two lines at i and at i + shift, of count lanes; beyond them nothing.
+/// to[i] rises to the greatest of from[i + shift], for shift in [least, most], where there is one.
 SCARP_FOR_EACH_TARGET
-void greatest_of_four(std::size_t count, std::size_t shift, const float* __restrict first,
-                      const float* __restrict second, float* __restrict to) {
-  const std::size_t inside = count > shift ? count - shift : 0;
-  for (std::size_t i = 0; i < inside; ++i)
-    to[i] = greater(greater(first[i], second[i]), greater(first[i + shift], second[i + shift]));
-  for (std::size_t i = inside; i < count; ++i) to[i] = greater(first[i], second[i]);
+void raise_to_two(std::ptrdiff_t first, std::ptrdiff_t end, std::ptrdiff_t shift,
+                  const float* __restrict from, float* __restrict to) {
+  for (std::ptrdiff_t i = first; i < end; ++i)
+    to[i] = greater(to[i], greater(from[i + shift], from[i + shift + 1]));
+}
+SCARP_FOR_EACH_TARGET
+void raise_to_one(std::ptrdiff_t first, std::ptrdiff_t end, std::ptrdiff_t shift,
+                  const float* __restrict from, float* __restrict to) {
+  for (std::ptrdiff_t i = first; i < end; ++i) to[i] = greater(to[i], from[i + shift]);
+}
+SCARP_FOR_EACH_TARGET
+void raise_to_two(std::ptrdiff_t first, std::ptrdiff_t end, std::ptrdiff_t shift,
+                  const std::uint8_t* __restrict from, std::uint8_t* __restrict to) {
+  for (std::ptrdiff_t i = first; i < end; ++i)
+    to[i] = static_cast<std::uint8_t>(to[i] | from[i + shift] | from[i + shift + 1]);
+}
+SCARP_FOR_EACH_TARGET
+void raise_to_one(std::ptrdiff_t first, std::ptrdiff_t end, std::ptrdiff_t shift,
+                  const std::uint8_t* __restrict from, std::uint8_t* __restrict to) {
+  for (std::ptrdiff_t i = first; i < end; ++i)
+    to[i] = static_cast<std::uint8_t>(to[i] | from[i + shift]);
 }
 
+/// to[i] rises to the magnitude of a rise between ground and ground.
 SCARP_FOR_EACH_TARGET
-void any_of_four(std::size_t count, std::size_t shift, const std::uint8_t* __restrict first,
-                 const std::uint8_t* __restrict second, std::uint8_t* __restrict to) {
-  const std::size_t inside = count > shift ? count - shift : 0;
-  for (std::size_t i = 0; i < inside; ++i)
-    to[i] = static_cast<std::uint8_t>(first[i] | second[i] | first[i + shift] | second[i + shift]);
-  for (std::size_t i = inside; i < count; ++i)
-    to[i] = static_cast<std::uint8_t>(first[i] | second[i]);
+void raise_to_steepness(std::size_t count, const float* __restrict a, const float* __restrict b,
+                        float* __restrict to) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const float rise = a[i] < b[i] ? b[i] - a[i] : a[i] - b[i];
+    to[i] = greater(to[i], rise < -MarchGround::kNothing / 10 ? rise : 0);
+  }
 }
 
-/// Greatest over squares of 2^kLeastLevel, from that many lines (kNothing where there is none).
-template <typename Value, typename Combine>
-void reduce_lines(std::vector<std::vector<Value>>& lines, std::size_t count,
-                  const Combine& combine) {
-  std::size_t shift = 1;
-  for (std::size_t left = lines.size(); left > 1; left /= 2, shift *= 2)
-    for (std::size_t i = 0; i < left / 2; ++i) {
-      std::vector<Value> to(count);
-      combine(count, shift, lines[2 * i].data(), lines[2 * i + 1].data(), to.data());
-      lines[i] = std::move(to);
-    }
+/// Whole lanes from `least` lanes off to `most`, both arrays `count` long; beyond there is nothing.
+template <typename Value>
+void raise_to(std::size_t count, double least, double most, const Value* from, Value* to) {
+  const auto end = static_cast<std::ptrdiff_t>(count);
+  auto shift = static_cast<std::ptrdiff_t>(std::ceil(least));
+  const auto last = static_cast<std::ptrdiff_t>(std::floor(most));
+  while (shift <= last) {
+    const bool two = shift < last;
+    const std::ptrdiff_t a = std::clamp<std::ptrdiff_t>(-shift, 0, end);
+    const std::ptrdiff_t b = std::clamp<std::ptrdiff_t>(end - shift - (two ? 1 : 0), a, end);
+    if (two)
+      raise_to_two(a, b, shift, from, to);
+    else
+      raise_to_one(a, b, shift, from, to);
+    // The lanes that have only one of two: borders of the padding, of which nothing is known.
+    if (two && a > 0) raise_to_one(a - 1, a, shift + 1, from, to);
+    if (two && b < end && b + shift >= 0 && b + shift < end)
+      raise_to_one(b, b + 1, shift, from, to);
+    shift += two ? 2 : 1;
+  }
 }
 
 }  // namespace
 
-MarchGround::MarchGround(const GroundGrid& grid, March march) : march_(march) {
+MarchGround::MarchGround(const GroundGrid& grid, March march, bool upside_down)
+    : march_(march), upside_down_(upside_down) {
   const bool rows = march == March::kOverRows;
   lines_ = rows ? grid.rows() : grid.columns();
   lanes_ = rows ? grid.columns() : grid.rows();
@@ -57,13 +82,13 @@ MarchGround::MarchGround(const GroundGrid& grid, March march) : march_(march) {
   // An odd number of cache lines, so that a lane's samples do not fall into few sets.
   stride_ = ((padded + kValuesInLine - 1) / kValuesInLine | 1) * kValuesInLine;
   read_heights(grid);
+  measure_steepness();
   int level = kLeastLevel;
   do {
     const auto side = std::int32_t{1} << level;
-    const auto blocks = static_cast<std::size_t>((lines_ + side - 1) / side);
-    highest_.emplace_back(blocks * stride_);
-    if (has_void_) void_.emplace_back(blocks * stride_);
-    build_level(highest_.size() - 1);
+    const auto strips = static_cast<std::size_t>((lines_ + side - 1) / side);
+    highest_.emplace_back(strips * stride_);
+    if (has_void_) void_.emplace_back(strips * stride_);
   } while ((std::int32_t{1} << level++) < lines_);
 }
 
@@ -96,10 +121,11 @@ void MarchGround::read_heights(const GroundGrid& grid) {
   const double reach_m =
       static_cast<double>(std::max<std::int64_t>(most - middle, 0)) * kLatticeStepM;
   rounding_m_ = reach_m < 4095 ? 0 : reach_m * 0x1p-24;
+  const double sign = upside_down_ ? -1 : 1;
   const auto value = [&](std::int32_t step) {
     return step == GroundGrid::kVoid
                ? kVoid
-               : static_cast<float>(static_cast<double>(step - middle) * kLatticeStepM);
+               : static_cast<float>(static_cast<double>(step - middle) * kLatticeStepM * sign);
   };
   // Columns become lines in bands, so that what is read and what is written stay in the cache.
   constexpr std::int32_t kBand = 16;
@@ -121,43 +147,85 @@ void MarchGround::read_heights(const GroundGrid& grid) {
   });
 }
 
-void MarchGround::build_level(std::size_t index) {
-  const int level = kLeastLevel + static_cast<int>(index);
-  const std::int32_t side = std::int32_t{1} << level;
-  const auto blocks = static_cast<std::size_t>((lines_ + side - 1) / side);
-  parallel_for(blocks, [&](std::size_t block) {
-    float* to = &highest_[index][block * stride_];
-    if (index == 0) {
-      std::vector<std::vector<float>> heights(static_cast<std::size_t>(side),
-                                              std::vector<float>(stride_, kNothing));
-      std::vector<std::vector<std::uint8_t>> voids(has_void_ ? static_cast<std::size_t>(side) : 0,
-                                                   std::vector<std::uint8_t>(stride_, 0));
-      for (std::size_t i = 0; i < static_cast<std::size_t>(side); ++i) {
-        const std::size_t line = block * static_cast<std::size_t>(side) + i;
-        if (line >= static_cast<std::size_t>(lines_)) break;
-        const float* from = &z_[line * stride_];
-        for (std::size_t lane = 0; lane < stride_; ++lane) {
-          heights[i][lane] = is_ground(from[lane]) ? from[lane] : kNothing;
-          if (has_void_) voids[i][lane] = is_void(from[lane]) ? 1 : 0;
-        }
-      }
-      reduce_lines(heights, stride_, greatest_of_four);
-      std::copy(heights[0].begin(), heights[0].end(), to);
-      if (!has_void_) return;
-      reduce_lines(voids, stride_, any_of_four);
-      std::copy(voids[0].begin(), voids[0].end(), &void_[index][block * stride_]);
-      return;
+void MarchGround::measure_steepness() {
+  constexpr std::int32_t kBand = 64;
+  std::vector<float> most(static_cast<std::size_t>((lines_ + kBand - 1) / kBand));
+  parallel_for(most.size(), [&](std::size_t band) {
+    std::vector<float> by_lane(stride_, 0);
+    const std::int32_t first = static_cast<std::int32_t>(band) * kBand;
+    for (std::int32_t l = first; l < std::min(first + kBand, lines_); ++l) {
+      const float* line = &z_[static_cast<std::size_t>(l) * stride_];
+      raise_to_steepness(stride_ - 1, line, line + 1, by_lane.data());
+      if (l + 1 < lines_) raise_to_steepness(stride_, line, line + stride_, by_lane.data());
     }
-    // An odd block out stands for both of its pair.
-    const std::size_t below = highest_[index - 1].size() / stride_;
-    const std::size_t first = 2 * block, second = std::min(2 * block + 1, below - 1);
-    const auto shift = static_cast<std::size_t>(side / 2);
-    greatest_of_four(stride_, shift, &highest_[index - 1][first * stride_],
-                     &highest_[index - 1][second * stride_], to);
-    if (has_void_)
-      any_of_four(stride_, shift, &void_[index - 1][first * stride_],
-                  &void_[index - 1][second * stride_], &void_[index][block * stride_]);
+    most[band] = *std::max_element(by_lane.begin(), by_lane.end());
   });
+  constexpr double kRoundingUp = 1 + 1e-6;
+  steepest_m_ = *std::max_element(most.begin(), most.end()) * kRoundingUp;
+}
+
+void MarchGround::lean(const StripLean& lean) {
+  if (has_strips_ && lean == lean_) return;
+  lean_ = lean;
+  has_strips_ = true;
+  make_least_strips();
+  for (std::size_t index = 1; index < highest_.size(); ++index) join_strips(index);
+}
+
+void MarchGround::make_least_strips() {
+  constexpr std::int32_t kSide = 1 << kLeastLevel;
+  parallel_for(highest_[0].size() / stride_, [&](std::size_t strip) {
+    float* to = &highest_[0][strip * stride_];
+    std::fill_n(to, stride_, kNothing);
+    std::uint8_t* void_to = has_void_ ? &void_[0][strip * stride_] : nullptr;
+    std::vector<std::uint8_t> voids(has_void_ ? stride_ : 0);
+    if (has_void_) std::fill_n(void_to, stride_, std::uint8_t{0});
+    for (std::int32_t i = 0; i < kSide; ++i) {
+      const std::int32_t line =
+          static_cast<std::int32_t>(strip) * kSide + (lean_.line_step > 0 ? i : kSide - 1 - i);
+      if (line >= lines_) continue;
+      const float* from = &z_[static_cast<std::size_t>(line) * stride_];
+      const double least = lean_of(i), most = least + width(kLeastLevel);
+      raise_to(stride_, least, most, from, to);
+      if (!has_void_) continue;
+      std::transform(from, from + stride_, voids.begin(),
+                     [](float z) { return static_cast<std::uint8_t>(is_void(z) ? 1 : 0); });
+      raise_to(stride_, least, most, voids.data(), void_to);
+    }
+  });
+}
+
+/// A strip's far half begins where the near one ends, seldom at a whole lane: then the lanes on
+/// both sides of that place. Squares have two in each half.
+void MarchGround::join_strips(std::size_t index) {
+  const std::int32_t half = 1 << (kLeastLevel + static_cast<int>(index) - 1);
+  const std::size_t parts = highest_[index - 1].size() / stride_;
+  const double far_lanes = lean_of(half);
+  const auto join_strip = [&](std::size_t strip) {
+    const std::size_t near = 2 * strip + (lean_.line_step > 0 ? 0 : 1);
+    const std::size_t far = 2 * strip + (lean_.line_step > 0 ? 1 : 0);
+    const auto join = [&](auto& levels, auto nothing) {
+      auto* to = &levels[index][strip * stride_];
+      const auto raise = [&](std::size_t part, double least, double most) {
+        if (part < parts) raise_to(stride_, least, most, &levels[index - 1][part * stride_], to);
+      };
+      std::fill_n(to, stride_, nothing);
+      raise(near, 0, 0);
+      raise(far, std::floor(far_lanes), std::ceil(far_lanes));
+      if (!lean_.are_squares) return;
+      raise(near, half, half);
+      raise(far, half, half);
+    };
+    join(highest_, kNothing);
+    if (has_void_) join(void_, std::uint8_t{0});
+  };
+  // A few are done before other threads have woken.
+  constexpr std::size_t kFew = 8;
+  const std::size_t strips = highest_[index].size() / stride_;
+  if (strips > kFew)
+    parallel_for(strips, join_strip);
+  else
+    for (std::size_t strip = 0; strip < strips; ++strip) join_strip(strip);
 }
 
 }  // namespace scarp

@@ -110,13 +110,16 @@ struct PlanRay {
   /// Where it crosses a line; nothing outside the grid.
   std::optional<Crossing> cross(const PlanMap& map, double at_line, double guess_lanes) const {
     if (at_line < 0 || at_line > map.lines() - 1) return {};
+    constexpr double kSettledLanes = 1e-11;
     double at = lane + guess_lanes;
     for (int i = 0; i < 4; ++i) {
       const double inside = std::clamp(at, 0.0, map.lanes() - 1);
       const Position p = map.at(inside, at_line);
       const auto step = map.lane_step(inside, at_line);
       const double off = (p.x_m - from.x_m) * y - (p.y_m - from.y_m) * x;
+      const double before = at;
       at = inside - off / (step[0] * y - step[1] * x);
+      if (std::abs(at - before) < kSettledLanes) break;
     }
     constexpr double kBorder = 1e-6;
     if (at < -kBorder || at > map.lanes() - 1 + kBorder) return {};
@@ -243,6 +246,12 @@ class FanMaker {
     side((tile_.lanes - 1) / 2.0, 0, fan_.turn.per_lane, fan_.stretch.per_lane);
     side(0, (tile_.lines - 1) / 2.0, fan_.turn.per_line, fan_.stretch.per_line);
     if (is_exact()) fan_.turn = {};
+    // What rounding makes of parallel rays; what it matters is measured.
+    constexpr double kParallelLanes = 1e-6;
+    if (std::abs(fan_.turn.per_lane) * tile_.lanes * map_.lines() < kParallelLanes)
+      fan_.turn.per_lane = 0;
+    if (std::abs(fan_.turn.per_line) * tile_.lines * map_.lines() < kParallelLanes)
+      fan_.turn.per_line = 0;
   }
 
   /// Along a line of samples that all have the same x (or y) a ray keeps to it exactly.
@@ -377,13 +386,18 @@ class FanMaker {
 
 }  // namespace
 
+Course course_of(const GroundGrid& grid, const std::optional<EarthFrame>& earth, March march,
+                 double lane, double line, const AzimuthAt& azimuth) {
+  const PlanMap map(grid, march);
+  const auto course = PlanRay(map, earth, lane, line, azimuth).course(map);
+  return {course[0] / std::abs(course[1]), course[1] < 0 ? -1 : 1};
+}
+
 double runs_along(const GroundGrid& grid, const std::optional<EarthFrame>& earth, March march,
                   const MarchTile& tile, const AzimuthAt& azimuth) {
-  const PlanMap map(grid, march);
-  const PlanRay ray(map, earth, tile.first_lane + (tile.lanes - 1) / 2.0,
-                    tile.first_line + (tile.lines - 1) / 2.0, azimuth);
-  const auto course = ray.course(map);
-  return std::abs(course[0] / course[1]);
+  return std::abs(course_of(grid, earth, march, tile.first_lane + (tile.lanes - 1) / 2.0,
+                            tile.first_line + (tile.lines - 1) / 2.0, azimuth)
+                      .lanes_per_line);
 }
 
 double greatest_tilt(const GroundGrid& grid) {

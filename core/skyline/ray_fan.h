@@ -63,6 +63,12 @@ struct RayFan {
 /// How much rays of an azimuth from a tile's middle run along lines for each line crossed; a march
 /// serves well up to 1, and at all up to kMostAlong.
 inline constexpr double kMostAlong = 1.5;
+struct Course {
+  double lanes_per_line = 0;  ///< crossed
+  int line_step = 1;
+};
+Course course_of(const GroundGrid& grid, const std::optional<EarthFrame>& earth, March march,
+                 double lane, double line, const AzimuthAt& azimuth);
 double runs_along(const GroundGrid& grid, const std::optional<EarthFrame>& earth, March march,
                   const MarchTile& tile, const AzimuthAt& azimuth);
 

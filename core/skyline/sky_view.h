@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "core/skyline/skyline.h"
+
 namespace scarp {
 
 /// What the horizons of all azimuths say together, taken in one after the other.
@@ -13,24 +15,29 @@ namespace scarp {
 ///   mean over the azimuths of cos^2 h, with h the horizon's elevation and at least 0
 /// (Dozier and Frew 1990, equation 7b for no slope). 1 on a plain, 0 in a well.
 ///
-/// Positive openness: mean over the azimuths of the zenith angle of the horizon, 90 degrees - h, h
-/// below 0 counted as such (Yokoyama, Shirasawa and Pike 2002; with no limit of distance). Above 90
-/// degrees on summits. Azimuths in which no ground lies within the data are left out.
+/// Openness: mean over the azimuths of 90 degrees - h, h below 0 counted as such (Yokoyama,
+/// Shirasawa and Pike 2002; with no limit of distance). Of horizons this is positive openness, the
+/// mean zenith angle, above 90 degrees on summits; of horizons upside down (Sight::kDown) negative
+/// openness, the mean nadir angle, above 90 degrees in hollows. Azimuths in which no ground lies
+/// within the data are left out.
 ///
 /// A sample with an unknown horizon has neither: NaN.
 /// Accuracy: that of the horizons; sums are rounded to 1e-6 of the result.
 class SkyView {
  public:
-  SkyView(std::size_t samples, bool wants_sky_view, bool wants_openness);
+  SkyView(std::int32_t columns, std::int32_t rows, bool wants_sky_view, bool wants_openness);
 
-  /// One azimuth's horizons, [samples], as Skyline gives them.
-  void add(std::span<const std::int16_t> elevations);
+  /// Before the parts of each azimuth.
+  void begin_azimuth();
+  /// Parts of one azimuth may come from several threads at once.
+  void add(const SkylinePart& part);
 
-  /// [samples]; afterwards nothing is to be added.
+  /// [rows * columns]; afterwards nothing is to be added.
   std::span<const float> sky_view();
   std::span<const float> openness_deg();
 
  private:
+  std::int32_t columns_;
   std::size_t samples_, azimuths_ = 0;
   std::vector<float> light_by_elevation_;
   std::vector<float> light_, zenith_steps_;

@@ -13,18 +13,32 @@
 
 namespace scarp {
 
+/// kUp: the highest that ground is seen. kDown: all is upside down, so that elevations are how far
+/// below the level plane the lowest ground is seen, and negative where all of it lies above.
+enum class Sight : std::uint8_t { kUp, kDown };
+
 struct SkylineOptions {
   double eye_height_m = 0;        ///< above ground, along the normal
   double tolerance_rad = 0.0035;  ///< by which upper and lower bound may differ at most
+  Sight sight = Sight::kUp;
 };
 
-/// One azimuth's horizons of all samples, each [rows * columns], in steps of 0.01 degree above the
-/// level plane of the sample's eye. kNothingSeen: no ground lies that way within the data;
-/// kUnknownElevation: the sample is void, or the ray passes void before known ground.
+/// One azimuth's horizons of a rectangle of samples, each [rows * columns], in steps of 0.01 degree
+/// above the level plane of the sample's eye. kNothingSeen: no ground lies that way within the
+/// data; kUnknownElevation: the sample is void, or the ray passes void before known ground.
+struct SkylinePart {
+  std::int32_t first_column = 0, first_row = 0, columns = 0, rows = 0;
+  std::span<const std::int16_t> estimate, lower, upper;
+  std::span<const float> distance_m;  ///< along the ground, of the estimate; empty: not wanted
+};
+/// Takes parts as they are found, on several threads at once and in no order.
+using TakeSkylinePart = std::function<void(const SkylinePart&)>;
+
+/// The same of all samples.
 struct SkylineBands {
   std::span<std::int16_t> estimate;
   std::span<std::int16_t> lower, upper;  ///< empty: not wanted
-  std::span<float> distance_m;           ///< along the ground, of the estimate; empty: not wanted
+  std::span<float> distance_m;           ///< empty: not wanted
 };
 
 /// The horizons of all samples of a grid: what the judge (judge_horizon) finds for each, in
@@ -34,10 +48,13 @@ struct SkylineBands {
 /// step at most, but where a ray grazes the border of the data or of void. The estimate is the
 /// greatest crossing compared, most often the horizon itself.
 /// Void: where a ray comes so near to void that it is not certain to miss it, it is unknown too.
-/// Cost: see march_tile; the same bits for any number of threads.
-/// Memory: the grid's 4 bytes a sample, 5 more (6 where there is void), and the bands.
+/// Cost: see march_tile; the same bits for any number of threads and parts.
+/// Memory: the grid's 4 bytes a sample, 5 more (5.3 where there is void), and 1 MB a thread.
 class Skyline {
  public:
+  /// Parts are squares of so many samples, less at the right and lower border.
+  static constexpr std::int32_t kPartSide = 256;
+
   /// grid is kept by reference. Requires at least 2 x 2 samples, kLeastCellM apart or more.
   Skyline(const GroundGrid& grid, const std::optional<EarthFrame>& earth,
           const SkylineOptions& options);
@@ -45,14 +62,17 @@ class Skyline {
   /// Samples are laid out anew when this changes from one azimuth to the next; so ask in its order.
   March march_for(const AzimuthAt& azimuth) const;
 
+  void look(const AzimuthAt& azimuth, bool measures_distance, const TakeSkylinePart& take);
   void look(const AzimuthAt& azimuth, const SkylineBands& bands);
 
  private:
-  struct Part;
-  const MarchGround& ground_for(March march);
-  std::vector<Part> parts_for(March preferred, const AzimuthAt& azimuth) const;
-  void look_from(const Part& part, const MarchGround& ground, const AzimuthAt& azimuth,
-                 const SkylineBands& bands) const;
+  struct Tile;
+  struct Found;
+  const MarchGround& ground_for(March march, const AzimuthAt& azimuth);
+  std::vector<Tile> tiles_of(const SkylinePart& part, March preferred,
+                             const AzimuthAt& azimuth) const;
+  void look_from(const Tile& tile, const MarchGround& ground, const AzimuthAt& azimuth,
+                 const SkylinePart& part, Found& found) const;
   float distance_m(const AzimuthAt& azimuth, std::int32_t column, std::int32_t row,
                    float run_m) const;
 

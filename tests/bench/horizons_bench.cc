@@ -7,35 +7,34 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <sstream>
 #include <string>
 #include <vector>
 
+#include "tests/support/refined_dem.h"
 #include "tests/support/shared_data.h"
 #include "tests/support/temp_folder.h"
 
 /// Horizons of all points: the whole command `scarp horizon` with and without bounds, nanoseconds
-/// a cell and direction, and its share for looking alone, on Big Tujunga refined to SIDE x SIDE
-/// samples; against `r.horizon` where GRASS is installed (the module alone, on sides up to 2048).
+/// a cell and direction, wall time and time of processors, and its share for looking alone, on Big
+/// Tujunga refined to SIDE x SIDE samples; against `r.horizon` where GRASS is installed (the module
+/// alone, on sides up to 2048), which runs right before and right after.
 /// Usage: horizons_bench [REPEATS (3) [SIDE ...  (1024 2048 4096 8192)]]
 namespace scarp {
 namespace {
 
-constexpr int kAzimuths = 6;
-constexpr int kGrassAzimuths = 3;
 constexpr int kLargestForGrass = 2048;
 
-/// Big Tujunga, cut and refined by cubic resampling.
-std::string refined(const std::string& dem, int side, const test::TempFolder& folder) {
-  const std::string plain = folder.path("plain.tif"),
-                    path = folder.path(fmt::format("u{}.tif", side));
-  const std::string commands = fmt::format(
-      "gdal_translate -q -a_nodata none -ot Float32 '{}' '{}' && gdalwarp -q -overwrite -te "
-      "384653.655454263 3788687.828 403853.655454263 3807887.828 -ts {} {} -r cubic -ot Float32 "
-      "'{}' '{}'",
-      dem, plain, side, side, plain, path);
-  if (std::system(commands.c_str()) != 0) std::exit(1);
-  return path;
+/// The command's own default; fewer where the output would be many gigabytes.
+int azimuths_of(int side) {
+  return side <= 4096 ? 16 : 6;
+}
+/// One takes minutes there.
+int grass_azimuths_of(int side) {
+  return side <= 2048 ? 3 : 1;
 }
 
 std::string output_of(const std::string& command) {
@@ -63,63 +62,94 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-/// Wall time of one r.horizon in a project of its own, seconds; 0 where it failed.
-double grass_seconds(const std::string& file) {
-  const std::string inside = fmt::format(
-      "r.in.gdal -o input=\"{}\" output=dem --quiet && g.region raster=dem && b=$(date +%s%N) && "
-      "r.horizon elevation=dem start=10 step={} output=h --quiet >/dev/null && "
-      "echo nanoseconds $(($(date +%s%N) - b))",
-      file, 360.0 / kGrassAzimuths);
-  const std::string text = output_of(
-      fmt::format("grass --tmp-location '{}' --exec sh -c '{}' 2>/dev/null", file, inside));
-  const std::size_t at = text.rfind("nanoseconds ");
-  return at == std::string::npos ? 0 : 1e-9 * std::atof(text.c_str() + at + 12);
+/// What r.horizon takes in a project of its own, seconds a direction; 0 where it failed.
+struct GrassCost {
+  double wall = 0, processors = 0;
+};
+GrassCost grass_cost(const std::string& file, int azimuths, const test::TempFolder& folder) {
+  const std::string script = folder.path("grass.sh");
+  std::ofstream(script) << fmt::format(
+      "set -e\nr.in.gdal -o input='{}' output=dem --quiet\ng.region raster=dem\n"
+      "TIMEFORMAT='seconds %R %U'\n"
+      "time r.horizon elevation=dem start=10 step={} output=h --quiet >/dev/null 2>&1\n",
+      file, 360.0 / azimuths);
+  const std::string text =
+      output_of(fmt::format("grass --tmp-location '{}' --exec bash '{}' 2>&1", file, script));
+  const std::size_t at = text.rfind("seconds ");
+  if (at == std::string::npos) return {};
+  GrassCost cost;
+  std::istringstream(text.substr(at + 8)) >> cost.wall >> cost.processors;
+  return {cost.wall / azimuths, cost.processors / azimuths};
+}
+
+/// Medians of whole runs, seconds a direction.
+struct Cost {
+  double wall = 0, look = 0, processors = 0;
+  double peak_bytes = 0;
+};
+
+std::optional<Cost> cost_of(const std::string& line, const std::string& output, int azimuths,
+                            int repeats) {
+  std::vector<double> wall_s, look_s, cpu_s;
+  Cost cost;
+  for (int i = 0; i < repeats; ++i) {
+    std::filesystem::remove(output);
+    const double cpu_before = children_seconds();
+    const auto start = std::chrono::steady_clock::now();
+    const std::string text = output_of(line);
+    const std::chrono::duration<double> time = std::chrono::steady_clock::now() - start;
+    if (text.empty()) return {};
+    wall_s.push_back(time.count() / azimuths);
+    cpu_s.push_back((children_seconds() - cpu_before) / azimuths);
+    const nlohmann::json report = nlohmann::json::parse(text);
+    for (const auto& stage : report["stages"]) {
+      if (stage["name"] != "look") continue;
+      look_s.push_back(stage["seconds"].get<double>() / azimuths);
+      cost.peak_bytes = stage["peak_bytes"];
+    }
+  }
+  cost.wall = median(wall_s);
+  cost.look = median(look_s);
+  cost.processors = median(cpu_s);
+  return cost;
 }
 
 void measure(const std::string& scarp, const std::string& dem, int side, int repeats) {
   const test::TempFolder folder;
-  const std::string file = refined(dem, side, folder);
-  const double cells = static_cast<double>(side) * side;
-  for (const auto& [name, options] :
-       {std::pair("with bounds", "--earth flat"),
-        std::pair("estimate", "--earth flat --estimate-only"),
-        std::pair("ellipsoid", "--earth ellipsoid --estimate-only")}) {
-    const std::string line =
-        fmt::format("'{}' horizon '{}' -o '{}' --azimuths {} {} --overwrite --json", scarp, file,
-                    folder.path("h.tif"), kAzimuths, options);
-    std::vector<double> whole_s, look_s, cpu_s;
-    double peak_bytes = 0;
-    for (int i = 0; i < repeats; ++i) {
-      const double cpu_before = children_seconds();
-      const auto start = std::chrono::steady_clock::now();
-      const std::string text = output_of(line);
-      const std::chrono::duration<double> time = std::chrono::steady_clock::now() - start;
-      if (text.empty()) {
-        fmt::print("{:>5} x {:<5} scarp {:<12} was refused\n", side, side, name);
-        return;
-      }
-      whole_s.push_back(time.count());
-      cpu_s.push_back(children_seconds() - cpu_before);
-      const nlohmann::json report = nlohmann::json::parse(text);
-      for (const auto& stage : report["stages"]) {
-        if (stage["name"] == "look") {
-          look_s.push_back(stage["seconds"]);
-          peak_bytes = stage["peak_bytes"];
-        }
-      }
-    }
-    const double scale = 1e9 / cells / kAzimuths;
+  const std::string file = test::refined_dem(dem, side, folder), output = folder.path("h.tif");
+  const double cells = static_cast<double>(side) * side, scale = 1e9 / cells;
+  const int azimuths = azimuths_of(side);
+  const bool has_grass =
+      side <= kLargestForGrass && std::system("command -v grass >/dev/null") == 0;
+  const int grass_azimuths = grass_azimuths_of(side);
+  GrassCost grass = has_grass ? grass_cost(file, grass_azimuths, folder) : GrassCost{};
+  std::vector<std::pair<std::string, Cost>> costs;
+  for (const auto& [name, options] : {std::pair("with bounds", "--earth flat"),
+                                      std::pair("estimate", "--earth flat --estimate-only"),
+                                      std::pair("ellipsoid", "--earth ellipsoid")}) {
+    const std::string line = fmt::format("'{}' horizon '{}' -o '{}' --azimuths {} {} --json", scarp,
+                                         file, output, azimuths, options);
+    if (const auto cost = cost_of(line, output, azimuths, repeats)) costs.push_back({name, *cost});
+  }
+  if (grass.wall > 0) {
+    const GrassCost after = grass_cost(file, grass_azimuths, folder);
+    grass = {(grass.wall + after.wall) / 2, (grass.processors + after.processors) / 2};
+    fmt::print(
+        "{:>5} x {:<5} r.horizon          {:7.1f} ns a cell and direction, {:26.1f} of "
+        "processors\n",
+        side, side, grass.wall * scale, grass.processors * scale);
+  }
+  for (const auto& [name, cost] : costs) {
     fmt::print(
         "{:>5} x {:<5} scarp {:<12} {:7.1f} ns a cell and direction, {:7.1f} looking, {:7.1f} of "
-        "processors; {:5.1f} bytes a cell while looking\n",
-        side, side, name, median(whole_s) * scale, median(look_s) * scale, median(cpu_s) * scale,
-        peak_bytes / cells);
+        "processors; {:5.1f} bytes a cell",
+        side, side, name, cost.wall * scale, cost.look * scale, cost.processors * scale,
+        cost.peak_bytes / cells);
+    if (grass.wall > 0)
+      fmt::print("; r.horizon takes {:.0f} times as long, {:.0f} times as much of processors",
+                 grass.wall / cost.wall, grass.processors / cost.processors);
+    fmt::print("\n");
   }
-  if (side > kLargestForGrass || std::system("command -v grass >/dev/null") != 0) return;
-  const double grass_s = grass_seconds(file);
-  if (grass_s > 0)
-    fmt::print("{:>5} x {:<5} r.horizon          {:7.1f} ns a cell and direction\n", side, side,
-               1e9 * grass_s / cells / kGrassAzimuths);
 }
 
 }  // namespace

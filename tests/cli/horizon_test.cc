@@ -85,7 +85,7 @@ TEST_F(HorizonCommand, WritesThreeBandsAnAzimuthAndSaysHow) {
   EXPECT_EQ(dataset->GetRasterBand(4)->GetNoDataValue(), -32768);
   EXPECT_STREQ(dataset->GetMetadataItem("SURFACE"), "grid");
   EXPECT_STREQ(dataset->GetMetadataItem("EARTH"), "flat");
-  EXPECT_STREQ(dataset->GetMetadataItem("LAYOUT", "IMAGE_STRUCTURE"), "COG");
+  EXPECT_STREQ(dataset->GetMetadataItem("INTERLEAVE", "IMAGE_STRUCTURE"), "BAND");
   const double at_wall = std::atan(50.0 / 400) * 18'000 / M_PI;
   EXPECT_NEAR(read(4)[kColumns + 1], at_wall, 1);
   EXPECT_LE(read(5)[kColumns + 1], at_wall);
@@ -119,6 +119,11 @@ TEST_F(HorizonCommand, SkyViewOpennessAndShadow) {
   EXPECT_GT(read(1, "sky.tif")[0], 0.99);
   EXPECT_LT(read(1, "open.tif")[4], 85);
   EXPECT_GT(read(1, "open.tif")[5], 90);
+  // From the wall down its side; from its foot the plain is lower than the wall.
+  ASSERT_EQ(horizon("--azimuths 10 --negative-openness " + out("down.tif")).exit_code, 0);
+  EXPECT_LT(read(1, "down.tif")[5], 85);
+  EXPECT_NEAR(read(1, "down.tif")[4], 90, 0.05);
+  EXPECT_TRUE(std::isnan(read(1, "down.tif")[5 * kColumns]));
   // In the morning the wall's shadow falls to the west: at this time over the whole plain there.
   ASSERT_EQ(horizon("-o " + out() + " --sun 2026-06-21T13:00Z --json").exit_code, 0);
   EXPECT_EQ(read(1)[2 * kColumns + 4], 0);
@@ -126,6 +131,48 @@ TEST_F(HorizonCommand, SkyViewOpennessAndShadow) {
   EXPECT_EQ(read(1)[5 * kColumns], 255);
   const GDALDatasetUniquePtr dataset(GDALDataset::Open(out().c_str(), GDAL_OF_RASTER));
   EXPECT_NEAR(std::atof(dataset->GetMetadataItem("SUN_ELEVATION_DEG")), 3.2, 1.5);
+}
+
+/// From a corner of the sea, away from where levels are those of the frame: what is seen lowest is
+/// the farthest water, half the angle to it below the level plane.
+TEST_F(HorizonCommand, OpennessOfTheSea) {
+  constexpr int kSide = 60;
+  constexpr double kCell = 0.02;
+  const std::string sea = folder_.path("sea.tif");
+  GDALDataset* dataset = GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
+      sea.c_str(), kSide, kSide, 1, GDT_Float32, nullptr);
+  double transform[6] = {10, kCell, 0, 1, 0, -kCell};
+  dataset->SetGeoTransform(transform);
+  OGRSpatialReference crs;
+  crs.SetFromUserInput("EPSG:4326");
+  dataset->SetSpatialRef(&crs);
+  dataset->GetRasterBand(1)->Fill(0);
+  GDALClose(dataset);
+  ASSERT_EQ(run_scarp("$SCARP horizon " + sea + " --azimuths 4 --openness " + out("up.tif") +
+                      " --negative-openness " + out("down.tif"))
+                .exit_code,
+            0);
+  const auto at_corner = [&](const std::string& name) {
+    const GDALDatasetUniquePtr written(GDALDataset::Open(out(name).c_str(), GDAL_OF_RASTER));
+    float value = 0;
+    EXPECT_EQ(
+        written->GetRasterBand(1)->RasterIO(GF_Read, 0, 0, 1, 1, &value, 1, 1, GDT_Float32, 0, 0),
+        CE_None);
+    return value;
+  };
+  // East and south, 59 cells each; near the equator a degree is nearly a degree.
+  EXPECT_NEAR(at_corner("down.tif"), 90 - 59 * kCell / 2, 0.02);
+  EXPECT_NEAR(at_corner("up.tif"), 90 + kCell / 2, 0.02);
+}
+
+/// Bands go to the disk as they are found: memory does not depend on how many there are.
+TEST_F(HorizonCommand, ManyAzimuthsTakeNoMoreMemory) {
+  const std::string options = " --azimuths 300 --overwrite --threads ";
+  ASSERT_EQ(horizon("-o " + out() + options + "2").exit_code, 0);
+  const RunResult small = horizon("-o " + out("small.tif") + options + "1 --memory 900");
+  ASSERT_EQ(small.exit_code, 0) << small.errors;
+  EXPECT_EQ(run_scarp("cmp " + out() + " " + out("small.tif")).exit_code, 0);
+  EXPECT_EQ(std::filesystem::file_size(out()), std::filesystem::file_size(out("small.tif")));
 }
 
 TEST_F(HorizonCommand, RefusesInOneLineAndLeavesNothing) {
@@ -147,7 +194,8 @@ TEST_F(HorizonCommand, RefusesInOneLineAndLeavesNothing) {
   refused(to + " --sky-view " + out(), 2, "twice");
   refused(to + " --crs OGC:CRS84", 2, "--crs");
   refused(to + " --refraction 2", 1, "refraction");
-  refused(to + " --azimuths 100000 --memory 10M", 1, "--azimuths");
+  refused(to + " --azimuths 100000", 2, "--azimuths");
+  refused(to + " --memory 700", 1, "--memory");
   EXPECT_NE(run_scarp("$SCARP horizon " + degrees() + " " + to).errors.find("CRS"),
             std::string::npos);
   refused("--at 500150,3999850 --sky-view " + out(), 2, "--sky-view");

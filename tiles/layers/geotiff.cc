@@ -15,6 +15,7 @@
 #include "core/error/error.h"
 #include "core/memory/large_array.h"
 #include "core/threads/parallel_for.h"
+#include "tiles/layers/describe_dataset.h"
 #include "tiles/layers/gdal_session.h"
 #include "tiles/layers/spatial_reference.h"
 
@@ -81,28 +82,8 @@ void build_overviews(GDALDataset& source, const LayerData& data) {
                           factors.data(), 0, nullptr, nullptr, nullptr);
 }
 
-/// GDAL 3.6 does not report what fails while it closes a file, but then samples are missing.
-/// @param source  with its overviews, all of which the file has, not packed
-void check_size(const std::string& built, GDALDataset& source, const std::string& path) {
-  GDALRasterBand& first = *source.GetRasterBand(1);
-  const auto samples_of = [](GDALRasterBand& band) {
-    return static_cast<std::size_t>(band.GetXSize()) * static_cast<std::size_t>(band.GetYSize());
-  };
-  std::size_t samples = samples_of(first);
-  for (int i = 0; i < first.GetOverviewCount(); ++i) samples += samples_of(*first.GetOverview(i));
-  const std::size_t bytes =
-      samples * static_cast<std::size_t>(source.GetRasterCount()) *
-      static_cast<std::size_t>(GDALGetDataTypeSizeBytes(first.GetRasterDataType()));
-  std::error_code unknown;
-  const auto size = std::filesystem::file_size(built, unknown);
-  if (unknown || size < bytes)
-    throw Error(ErrorCode::kResource,
-                fmt::format("'{}': only {} of {} bytes could be written; free space on the disk or "
-                            "write elsewhere",
-                            path, unknown ? 0 : size, bytes));
-}
-
-/// The same for packed blocks: does the file hold all of them?
+/// GDAL 3.6 does not report what fails while it closes a file, but then blocks are missing: does
+/// the file hold all of them?
 void check_blocks(const std::string& built, const std::string& path) {
   const GDALDatasetUniquePtr file(GDALDataset::Open(built.c_str(), GDAL_OF_RASTER));
   std::error_code unknown;
@@ -141,7 +122,13 @@ int CPL_STDCALL relieve(double, const char*, void*) {
   return TRUE;
 }
 
-void describe(GDALDataset& dataset, const RasterLayer& layer) {
+}  // namespace
+
+void describe(GDALDataset& dataset, const RasterLayer& layer, const std::string& path) {
+  if (!layer.crs_wkt.empty()) {
+    const OGRSpatialReference crs = spatial_reference(layer.crs_wkt, path);
+    dataset.SetSpatialRef(&crs);
+  }
   std::array<double, 6> geotransform = layer.geotransform;
   dataset.SetGeoTransform(geotransform.data());
   for (const auto& [key, value] : layer.metadata)
@@ -167,8 +154,6 @@ void describe(GDALDataset& dataset, const RasterLayer& layer) {
   band.SetColorTable(&table);
 }
 
-}  // namespace
-
 void write_geotiff_cog(const std::string& path, const RasterLayer& layer, Existing existing) {
   const LayerData data = data_of(layer.samples);
   assert(layer.columns >= 1 && layer.rows >= 1);
@@ -178,36 +163,26 @@ void write_geotiff_cog(const std::string& path, const RasterLayer& layer, Existi
   PartFile file(path, existing);
   const GdalSession session;
   const GDALDatasetUniquePtr source = memory_dataset(layer, data, session, path);
-  describe(*source, layer);
-  if (!layer.crs_wkt.empty()) {
-    const OGRSpatialReference crs = spatial_reference(layer.crs_wkt, path);
-    source->SetSpatialRef(&crs);
-  }
+  describe(*source, layer, path);
   if (!layer.saves_memory) build_overviews(*source, data);
   session.check(path);
   CPLStringList options;
-  options.SetNameValue("COMPRESS", layer.is_bulky ? "NONE" : "DEFLATE");
-  if (!layer.is_bulky) {
-    options.SetNameValue("PREDICTOR", data.predictor);
-    options.SetNameValue("LEVEL", "1");  // the most of what can be had, at a third of the time
-  }
+  options.SetNameValue("COMPRESS", "DEFLATE");
+  options.SetNameValue("PREDICTOR", data.predictor);
+  options.SetNameValue("LEVEL", "1");  // the most of what can be had, at a third of the time
   options.SetNameValue("BIGTIFF", "IF_SAFER");
   options.SetNameValue("NUM_THREADS", std::to_string(thread_count()).c_str());
   options.SetNameValue("OVERVIEW_RESAMPLING", data.is_float ? "AVERAGE" : "NEAREST");
   GDALDriver* driver = GetGDALDriverManager()->GetDriverByName("COG");
   if (driver == nullptr) session.fail(path);
-  const bool on_disk = layer.is_bulky || layer.saves_memory;
-  const std::string built = on_disk ? file.part_path() : session.folder() + "/layer.tif";
+  const std::string built = layer.saves_memory ? file.part_path() : session.folder() + "/layer.tif";
   GDALDatasetUniquePtr cog(
       driver->CreateCopy(built.c_str(), source.get(), TRUE, options.List(), relieve, nullptr));
   if (!cog) session.fail(path);
   cog.reset();  // closing writes the rest
   session.check(path);
-  if (on_disk) {
-    if (layer.is_bulky)
-      check_size(built, *source, path);
-    else
-      check_blocks(built, path);
+  if (layer.saves_memory) {
+    check_blocks(built, path);
     file.take_over();
   } else {
     file.append(session.bytes_of(built, path));

@@ -35,8 +35,6 @@ struct RasterLayer {
   std::string band_name;               ///< such as "visible"
   std::vector<RasterBand> more_bands;  ///< after the first, with its unit, nodata and scale
   double scale = 1;                    ///< what a step of the numbers is worth, in the unit
-  /// Many bands: not packed, and built on the disk instead of in memory.
-  bool is_bulky = false;
   /// Built on the disk, overviews as well, so that memory holds only blocks; slower.
   bool saves_memory = false;
   std::string unit;              ///< such as "m"; empty: none
@@ -53,7 +51,7 @@ struct RasterLayer {
 /// Requires columns, rows >= 1, as many samples, colours only for uint8 (asserted).
 /// Errors: kResource with GDAL's own words or from the disk, kInput where the file exists and is
 /// not to be replaced, or the CRS is not WKT. Nothing is left behind. Memory: overviews (a third of
-/// the samples) and, unless bulky, the compressed file; blocks only where it saves memory.
+/// the samples) and the compressed file; blocks only where it saves memory.
 void write_geotiff_cog(const std::string& path, const RasterLayer& layer, Existing existing);
 
 }  // namespace scarp

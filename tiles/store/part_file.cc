@@ -103,6 +103,34 @@ void PartFile::take_over() {
   if (!file_) throw_write_error(path_, errno);
 }
 
+void PartFile::reserve(std::uint64_t bytes) {
+  const auto length = static_cast<off_t>(bytes);
+  if (::ftruncate(file_.descriptor(), length) != 0) throw_write_error(path_, errno);
+  // A file system that cannot reserve shows its lack of room when it is written.
+  if (length > 0 && ::fallocate(file_.descriptor(), 0, 0, length) != 0 && errno != EOPNOTSUPP &&
+      errno != ENOSYS)
+    throw_write_error(path_, errno);
+}
+
+void PartFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes) {
+  assert(file_);
+  while (!bytes.empty()) {
+    const ssize_t written =
+        ::pwrite(file_.descriptor(), bytes.data(), std::min(bytes.size(), kLargestWrite),
+                 static_cast<off_t>(offset));
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) throw_write_error(path_, errno);
+    bytes = bytes.subspan(static_cast<std::size_t>(written));
+    offset += static_cast<std::uint64_t>(written);
+  }
+}
+
+void PartFile::begin_flush(std::uint64_t offset, std::uint64_t bytes) {
+  // What fails here fails in commit() once more.
+  ::sync_file_range(file_.descriptor(), static_cast<off_t>(offset), static_cast<off_t>(bytes),
+                    SYNC_FILE_RANGE_WRITE);
+}
+
 void PartFile::commit() {
   assert(file_);
   if (::fsync(file_.descriptor()) != 0) throw_write_error(path_, errno);

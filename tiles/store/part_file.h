@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 
@@ -29,6 +30,14 @@ class PartFile {
   PartFile& operator=(const PartFile&) = delete;
 
   void append(std::span<const std::byte> bytes);
+
+  /// Makes the part so long, and asks for room on the disk, so that too little shows before long
+  /// work. What is not written reads as zeros.
+  void reserve(std::uint64_t bytes);
+  /// Anywhere in the file, from several threads at once.
+  void write_at(std::uint64_t offset, std::span<const std::byte> bytes);
+  /// Has the system begin to move a stretch to the disk, so that commit() has less to wait for.
+  void begin_flush(std::uint64_t offset, std::uint64_t bytes);
 
   /// The part's own name, for a writer that wants one and may put a new file there; afterwards
   /// take_over() makes what is there the part.

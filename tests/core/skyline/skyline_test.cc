@@ -324,15 +324,107 @@ TEST(CastShadow, NoneWhereTheSunIsUpAndAllWhereItIsDown) {
 }
 
 TEST(SkyView, OfEqualHorizons) {
-  SkyView sky(3, true, true);
-  for (int i = 0; i < 4; ++i)
-    sky.add(std::vector<std::int16_t>{3000, -500, i == 2 ? kUnknownElevation : kNothingSeen});
+  SkyView sky(3, 1, true, true);
+  for (int i = 0; i < 4; ++i) {
+    const std::vector<std::int16_t> elevations = {3000, -500,
+                                                  i == 2 ? kUnknownElevation : kNothingSeen};
+    sky.begin_azimuth();
+    // In two parts, as they come.
+    sky.add({0, 0, 2, 1, std::span(elevations).first(2), {}, {}, {}});
+    sky.add({2, 0, 1, 1, std::span(elevations).last(1), {}, {}, {}});
+  }
   EXPECT_NEAR(sky.sky_view()[0], 0.75, 1e-6);
   EXPECT_NEAR(sky.sky_view()[1], 1, 1e-6);
   EXPECT_TRUE(std::isnan(sky.sky_view()[2]));
   EXPECT_NEAR(sky.openness_deg()[0], 60, 1e-4);
   EXPECT_NEAR(sky.openness_deg()[1], 95, 1e-4);
   EXPECT_TRUE(std::isnan(sky.openness_deg()[2]));
+}
+
+/// Openness of a sample, up or down, from as many azimuths.
+double openness_deg(const GroundGrid& grid, Sight sight, std::int32_t column, std::int32_t row,
+                    int azimuths = 16) {
+  SkylineOptions options;
+  options.sight = sight;
+  Skyline skyline(grid, {}, options);
+  SkyView view(grid.columns(), grid.rows(), false, true);
+  for (int i = 0; i < azimuths; ++i) {
+    view.begin_azimuth();
+    skyline.look(fixed_azimuth(i * kTurn / azimuths), false,
+                 [&](const SkylinePart& part) { view.add(part); });
+  }
+  return view.openness_deg()[static_cast<std::size_t>(row * grid.columns() + column)];
+}
+
+TEST(Openness, OfAPlaneIsARightAngleHoweverItTilts) {
+  for (const double rise_m : {0.0, 4.0}) {
+    const GroundGrid plane = ground_of(
+        41, 41, 10, [&](std::int32_t c, std::int32_t r) { return rise_m * c + rise_m / 2 * r; });
+    for (const Sight sight : {Sight::kUp, Sight::kDown})
+      EXPECT_NEAR(openness_deg(plane, sight, 20, 20), 90, 0.02) << rise_m;
+  }
+}
+
+TEST(Openness, OfAConeAndOfAPitAreEachOthersMirror) {
+  // A cone of 45 degrees on a plain, 200 m high, seen from its top: up to the plain's border,
+  // 600 m off in eight azimuths and a little more in the others; down to its own side.
+  constexpr int kSide = 121, kMiddle = 60;
+  const auto cone_m = [](std::int32_t c, std::int32_t r) {
+    return std::max(0.0, 200 - 10 * std::hypot(c - kMiddle, r - kMiddle));
+  };
+  const GroundGrid cone = ground_of(kSide, kSide, 10, cone_m);
+  const GroundGrid pit =
+      ground_of(kSide, kSide, 10, [&](std::int32_t c, std::int32_t r) { return -cone_m(c, r); });
+  const double to_border = std::atan(200.0 / 600) * 360 / kTurn;
+  const double up = openness_deg(cone, Sight::kUp, kMiddle, kMiddle, 4);
+  EXPECT_NEAR(up, 90 + to_border, 0.02);
+  // Along rows and columns the cone is exact; beside them lines are chords of its circles.
+  EXPECT_NEAR(openness_deg(cone, Sight::kDown, kMiddle, kMiddle, 4), 45, 0.02);
+  EXPECT_NEAR(openness_deg(pit, Sight::kUp, kMiddle, kMiddle, 4), 45, 0.02);
+  EXPECT_NEAR(openness_deg(pit, Sight::kDown, kMiddle, kMiddle, 4), up, 0.02);
+}
+
+/// Upside down and up again is the same ground.
+TEST(Openness, LookingDownIsLookingUpAtTheGroundTimesMinusOne) {
+  std::mt19937 random(21);
+  std::vector<double> heights_m(90 * 70);
+  for (std::int32_t r = 0; r < 70; ++r)
+    for (std::int32_t c = 0; c < 90; ++c)
+      heights_m[static_cast<std::size_t>(r * 90 + c)] =
+          test::relief_height_m(test::Relief::kSmooth, c, r, random);
+  const auto grid = [&](double sign) {
+    return ground_of(90, 70, 30, [&](std::int32_t c, std::int32_t r) {
+      return sign * heights_m[static_cast<std::size_t>(r * 90 + c)];
+    });
+  };
+  const GroundGrid ground = grid(1), mirrored = grid(-1);
+  SkylineOptions down;
+  down.sight = Sight::kDown;
+  for (const double azimuth : {0.0, 0.9, 2.2, 3.9, 5.5}) {
+    const Found below = look(ground, azimuth, down), above = look(mirrored, azimuth);
+    EXPECT_EQ(below.estimate, above.estimate) << azimuth;
+    EXPECT_EQ(below.lower, above.lower) << azimuth;
+    EXPECT_EQ(below.upper, above.upper) << azimuth;
+  }
+}
+
+/// Rays through the samples themselves, over walls, spikes and to all borders.
+TEST(Skyline, BoundsHoldOnDiagonals) {
+  std::mt19937 random(17);
+  std::size_t compared = 0;
+  for (const auto relief : {test::Relief::kSmooth, test::Relief::kRough}) {
+    const GroundGrid grid = ground_of(120, 90, 30, [&](std::int32_t c, std::int32_t r) {
+      return test::relief_height_m(relief, c, r, random);
+    });
+    for (int i = 0; i < 4; ++i) {
+      const Comparison one = expect_bounded(grid, (2 * i + 1) * kTurn / 8, {}, "diagonal", 3);
+      compared += one.compared;
+      EXPECT_LT(one.error_deg / static_cast<double>(one.compared), 0.05);
+    }
+    // Every other line is met in a sample.
+    compared += expect_bounded(grid, std::atan(0.5), {}, "two to one", 3).compared;
+  }
+  EXPECT_GT(compared, 8000U);
 }
 
 }  // namespace

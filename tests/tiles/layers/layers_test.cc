@@ -253,50 +253,5 @@ TEST(Png, RoundTripAndFailures) {
   EXPECT_EQ(folder.names(), std::set<std::string>{"p.png"});
 }
 
-TEST(GeoTiff, ManyBandsAreBuiltOnTheDisk) {
-  const TemporaryFolder folder;
-  constexpr std::int32_t kColumns = 700, kRows = 90;
-  std::vector<std::int16_t> samples(3 * kColumns * kRows);
-  for (std::size_t i = 0; i < samples.size(); ++i)
-    samples[i] = static_cast<std::int16_t>(i * 2654435761U);
-  const std::span<const std::int16_t> all(samples);
-  constexpr std::size_t kBand = kColumns * kRows;
-  RasterLayer layer;
-  layer.columns = kColumns;
-  layer.rows = kRows;
-  layer.samples = all.first(kBand);
-  layer.band_name = "first";
-  layer.more_bands = {{"second", all.subspan(kBand, kBand)}, {"third", all.subspan(2 * kBand)}};
-  layer.unit = "degree";
-  layer.scale = 0.01;
-  layer.nodata = -32768;
-  layer.is_bulky = true;
-  const std::string path = folder / "bands.tif";
-  write_geotiff_cog(path, layer, Existing::kRefuse);
-  const GDALDatasetUniquePtr written = open(path);
-  ASSERT_NE(written, nullptr);
-  ASSERT_EQ(written->GetRasterCount(), 3);
-  EXPECT_STREQ(written->GetMetadataItem("LAYOUT", "IMAGE_STRUCTURE"), "COG");
-  EXPECT_GT(written->GetRasterBand(3)->GetOverviewCount(), 0);
-  for (int b = 0; b < 3; ++b) {
-    GDALRasterBand& band = *written->GetRasterBand(b + 1);
-    std::vector<std::int16_t> back(kBand);
-    ASSERT_EQ(band.RasterIO(GF_Read, 0, 0, kColumns, kRows, back.data(), kColumns, kRows, GDT_Int16,
-                            0, 0),
-              CE_None);
-    const auto expected = all.subspan(static_cast<std::size_t>(b) * kBand, kBand);
-    EXPECT_TRUE(std::equal(back.begin(), back.end(), expected.begin())) << b;
-    EXPECT_EQ(band.GetScale(), 0.01);
-    EXPECT_EQ(band.GetNoDataValue(), -32768);
-  }
-  EXPECT_STREQ(written->GetRasterBand(2)->GetDescription(), "second");
-  // Nothing but the layer is left in the folder.
-  EXPECT_EQ(folder.names(), std::set<std::string>{"bands.tif"});
-  EXPECT_NE(message_of([&] { write_geotiff_cog(path, layer, Existing::kRefuse); }), "");
-  EXPECT_NE(
-      message_of([&] { write_geotiff_cog(folder / "nowhere/x.tif", layer, Existing::kRefuse); }),
-      "");
-}
-
 }  // namespace
 }  // namespace scarp
