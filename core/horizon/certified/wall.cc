@@ -9,7 +9,7 @@ namespace scarp {
 namespace {
 
 /// A chain is followed this far each way.
-constexpr int kMostSteps = 12;
+constexpr int kMostSteps = 48;
 
 /// A chain must not run nearly along the fan: its edges turn from the axis by this tangent at
 /// least. Guides the search; that rays cross an edge one way is asked for besides.
@@ -25,7 +25,7 @@ class Chain {
   bool follow(const RidgeEdges::Edge& edge, std::vector<VertexIndex>& vertices) const {
     VertexIndex low = edge[0], high = edge[1];
     if (place(low).v_m > place(high).v_m) std::swap(low, high);
-    if (!is_crossed(place(low), place(high))) return false;
+    if (!is_rising(place(low), place(high))) return false;
     vertices.assign(1, low);
     if (!extend(beam_.low, -1, vertices)) return false;
     std::reverse(vertices.begin(), vertices.end());
@@ -42,28 +42,49 @@ class Chain {
     return q.v_m - p.v_m > std::abs(q.u_m - p.u_m) * least + 8 * view_.error_m;
   }
 
-  /// Appends vertices until one lies beyond a side of the beam.
+  bool is_rising(const FanPlace& p, const FanPlace& q) const {
+    return q.v_m - p.v_m > 8 * view_.error_m;
+  }
+
+  /// Appends vertices until one lies beyond a side of the beam. Goes back from where no edge leads
+  /// on, such as a tip of ground in a void.
   bool extend(const HalfPlane& side_line, int side, std::vector<VertexIndex>& vertices) const {
+    const std::size_t begin = vertices.size();
+    std::array<VertexIndex, kMostSteps> left;  // where it has been in vain
+    std::size_t left_count = 0;
     for (int steps = 0; side_line.at(place(vertices.back())) >= 0; ++steps) {
-      const auto next = highest_from(vertices.back(), side);
-      if (!next || steps == kMostSteps) return false;
-      vertices.push_back(*next);
+      if (steps == kMostSteps) return false;
+      const auto next = highest_from(vertices.back(), side, {left.data(), left_count});
+      if (next) {
+        vertices.push_back(*next);
+        continue;
+      }
+      if (vertices.size() == begin) return false;
+      left[left_count++] = vertices.back();
+      vertices.pop_back();
     }
     return true;
   }
 
   /// The edge that rises most across the beam, as sight lines of the slope see it.
-  std::optional<VertexIndex> highest_from(VertexIndex v, int side) const {
+  std::optional<VertexIndex> highest_from(VertexIndex v, int side,
+                                          std::span<const VertexIndex> left) const {
     const FanPlace& p = place(v);
-    std::optional<VertexIndex> best;
-    double best_rise = -HUGE_VAL;
+    std::optional<VertexIndex> best, other_best;
+    double best_rise = -HUGE_VAL, other_best_rise = -HUGE_VAL;
     for (const VertexIndex other : ridges_.around_of(v)) {
       const FanPlace& q = place(other);
-      if (!(side > 0 ? is_crossed(p, q) : is_crossed(q, p))) continue;
-      const double rise = (q.z_m - p.z_m - slope_ * (q.u_m - p.u_m)) / std::abs(q.v_m - p.v_m);
+      if (!(side > 0 ? is_rising(p, q) : is_rising(q, p))) continue;
+      if (std::find(left.begin(), left.end(), other) != left.end()) continue;
+      const double above_m = q.z_m - p.z_m - slope_ * (q.u_m - p.u_m);
+      if (!(side > 0 ? is_crossed(p, q) : is_crossed(q, p))) {
+        if (above_m > other_best_rise) other_best = other, other_best_rise = above_m;
+        continue;
+      }
+      const double rise = above_m / std::abs(q.v_m - p.v_m);
       if (rise > best_rise) best = other, best_rise = rise;
     }
-    return best;
+    return best ? best : other_best;
   }
 
   const RidgeEdges& ridges_;
@@ -75,7 +96,7 @@ class Chain {
 }  // namespace
 
 bool raise_wall(const RidgeEdges& ridges, const FanView& view, const Beam& beam,
-                std::span<const FanPlace> targets, std::uint32_t edge, double slope, Wall& wall) {
+                const Places& targets, std::uint32_t edge, double slope, Wall& wall) {
   const std::vector<VertexIndex>& chain = wall.chain;
   if (!Chain(ridges, view, beam, slope).follow(ridges.edges[edge], wall.chain)) return false;
   wall.u_m = -HUGE_VAL;
@@ -88,13 +109,27 @@ bool raise_wall(const RidgeEdges& ridges, const FanView& view, const Beam& beam,
     if (!(from <= to)) continue;
     const std::array<FanPlace, 2> ends{between(a, b, from), between(a, b, to)};
     EdgePlane plane(view, a, b);
-    for (const FanPlace& target : targets) plane.hold(target);
-    if (!plane.is_held()) return false;
+    plane.hold(targets);
     for (const FanPlace& end : ends) {
       if (!(beam.ahead.at(end) > 8 * view.error_m)) return false;
       wall.u_m = std::max(wall.u_m, end.u_m);
     }
-    wall.planes.push_back(plane.plane(ends[0], ends[1]));
+    if (plane.is_held()) {
+      wall.planes.push_back(plane.plane(ends[0], ends[1]));
+    }
+    CurtainPlane curtain(view, ends[0], ends[1]);
+    curtain.hold(targets);
+    if (plane.is_held()) {
+      if (!curtain.is_held()) continue;
+      const SkyPlane level = curtain.plane();
+      SkyPlane& sky = wall.planes.back();
+      if (level.line_slope > sky.line_slope) {
+        sky.line_slope = level.line_slope, sky.line_m = level.line_m;
+      }
+      continue;
+    }
+    if (!curtain.is_held()) return false;
+    wall.planes.push_back(curtain.plane());
   }
   return !wall.planes.empty();
 }

@@ -6,6 +6,7 @@
 
 #include "core/horizon/certified/edge_plane.h"
 #include "core/horizon/certified/fan.h"
+#include "core/horizon/certified/places.h"
 #include "core/horizon/certified/ridges.h"
 
 namespace scarp {
@@ -55,6 +56,6 @@ struct Wall {
 /// @return whether there is such a wall
 /// Side: planes never above the true ones. Cost: O(chain * (targets + edges at a vertex)).
 bool raise_wall(const RidgeEdges& ridges, const FanView& view, const Beam& beam,
-                std::span<const FanPlace> targets, std::uint32_t edge, double slope, Wall& wall);
+                const Places& targets, std::uint32_t edge, double slope, Wall& wall);
 
 }  // namespace scarp
