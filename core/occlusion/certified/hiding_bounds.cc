@@ -175,6 +175,7 @@ class Bounding {
     float* bounds;  // of the group: [kRings * sectors]
     ReachedCells::Known known;
     std::vector<FanEdge> crests{};
+    std::vector<std::uint32_t> candidates{};
     std::vector<FanEdge> exits{};  // all that rays can leave over
     std::array<PieceTargets, kMostHalvings + 1> targets{};
     Places places{};
@@ -217,9 +218,26 @@ class Bounding {
     std::sort(look.exits.begin(), look.exits.end(), [](const FanEdge& p, const FanEdge& q) {
       return p.a.z_m + p.b.z_m > q.a.z_m + q.b.z_m;
     });
-    std::vector<std::uint32_t> all(look.crests.size());
-    std::iota(all.begin(), all.end(), 0U);
-    for (const FanEdge& edge : look.exits) look_from_piece(look, {edge.a, edge.b, &edge}, all);
+    for (const FanEdge& edge : look.exits) {
+      behind(look, edge);
+      look_from_piece(look, {edge.a, edge.b, &edge}, look.candidates);
+    }
+  }
+
+  /// Finds the crests that rays over an edge can have come from.
+  static void behind(Look& look, const FanEdge& edge) {
+    const double drift_m = 2 * look.radius_m * look.view.fan.tan_half + 16 * look.view.error_m;
+    const double low_v_m = std::min(edge.a.v_m, edge.b.v_m) - drift_m;
+    const double high_v_m = std::max(edge.a.v_m, edge.b.v_m) + drift_m;
+    const double high_u_m = std::max(edge.a.u_m, edge.b.u_m) + 16 * look.view.error_m;
+    look.candidates.clear();
+    for (std::uint32_t i = 0; i < look.crests.size(); ++i) {
+      const FanEdge& crest = look.crests[i];
+      if (std::max(crest.a.v_m, crest.b.v_m) >= low_v_m &&
+          std::min(crest.a.v_m, crest.b.v_m) <= high_v_m &&
+          std::min(crest.a.u_m, crest.b.u_m) <= high_u_m)
+        look.candidates.push_back(i);
+    }
   }
 
   /// Whether every ray over the piece leaves the group once more, over one edge: then it has been
@@ -259,8 +277,10 @@ class Bounding {
     };
     const std::size_t low = lane_of(std::min(va, vb) - slack_m);
     const std::size_t high = lane_of(std::max(va, vb) + slack_m);
-    look.reached().reach(look.rings, look.turns, borders_, low, high, look.known,
-                         look.depth > 0 ? &look.reached_by_depth[look.depth - 1] : nullptr);
+    if (look.depth == 0)
+      look.reached().reach(look.rings, look.turns, borders_, low, high, look.known);
+    else
+      look.reached().reach_part(look.reached_by_depth[look.depth - 1], low, high);
     // The outer of the lanes has the least reach.
     return high + low >= kLanes ? high : low;
   }
@@ -378,6 +398,7 @@ class Bounding {
     if (look.depth < kMostHalvings && du_m * du_m + dv_m * dv_m > size_m * size_m) {
       const FanPlace middle{piece.a.u_m + du_m / 2, piece.a.v_m + dv_m / 2,
                             piece.a.z_m + (piece.b.z_m - piece.a.z_m) / 2};
+      look.reached().lower_closed(look.bounds);
       ++look.depth;
       look_from_piece(look, {piece.a, middle, piece.edge}, targets.crests);
       look_from_piece(look, {middle, piece.b, piece.edge}, targets.crests);

@@ -41,6 +41,23 @@ void raise_cells(const CellColumns& cells, const CellPlane* planes, std::size_t 
   for (std::size_t i = first; i < end; ++i) best[i] = best[i] < least[i] ? least[i] : best[i];
 }
 
+/// Raises the bounds of rings from `first` on to the lowest of some planes along any ray.
+SCARP_FOR_EACH_TARGET
+void raise_rings(const RingTable& rings, const RingRow& forward, const CellPlane* planes,
+                 std::size_t plane_count, std::size_t first, float* least, float* best) {
+  for (std::size_t k = 0; k < kRings; ++k) least[k] = kEverything;
+  for (std::size_t p = 0; p < plane_count; ++p) {
+    const CellPlane plane = planes[p];
+    const RingRow& inverse = plane.line_rise < 0 ? rings.near_inverse : rings.far_inverse;
+    for (std::size_t k = 0; k < kRings; ++k) {
+      const float along =
+          plane.line_rise * inverse[k] + (plane.rising * forward[k] + plane.falling);
+      least[k] = along < least[k] ? along : least[k];
+    }
+  }
+  for (std::size_t k = first; k < kRings; ++k) best[k] = best[k] < least[k] ? least[k] : best[k];
+}
+
 /// Whether one of some numbers is less than another.
 SCARP_FOR_EACH_TARGET
 bool is_any_less(const float* numbers, const float* others, std::size_t count) {
@@ -123,53 +140,77 @@ void Turns::turn_to(const PolarLayout& layout, const Fan& fan, const RingTable& 
     }
 }
 
+void ReachedCells::make_room(std::size_t size) {
+  if (cell_.size() >= size) return;
+  cell_.resize(size), turn_.resize(size);
+  for (auto* column : {&near_inverse_, &far_inverse_, &forward_, &low_x_, &low_y_, &high_x_,
+                       &high_y_, &best_, &wanted_, &least_})
+    column->resize(size);
+}
+
 void ReachedCells::reach(const RingTable& rings, const Turns& turns,
                          std::span<const SectorBorders> borders, std::size_t low, std::size_t high,
-                         const Known& known, const ReachedCells* whole) {
+                         const Known& known) {
   const auto sectors = static_cast<std::int32_t>(borders.size());
   const auto& first_turn = turns.first[low];
   const auto& last_turn = turns.last[high];
-  std::uint32_t size = 0;
+  std::size_t most = 0;
+  for (std::size_t k = 0; k < kRings; ++k)
+    most += static_cast<std::size_t>(std::max(0, last_turn[k] - first_turn[k] + 1));
+  make_room(most);
+  rings_ = &rings, turns_ = &turns, low_ = low, high_ = high, sectors_ = sectors;
+  hints_ = known.least;
+  ring_best_.fill(kNothing);
+  std::uint32_t wanted = 0;
   for (std::size_t k = 0; k < kRings; ++k) {
-    first_[k] = size;
-    size += static_cast<std::uint32_t>(std::max(0, last_turn[k] - first_turn[k] + 1));
-  }
-  first_[kRings] = size;
-  turn_ = first_turn;
-  if (cell_.size() < size) {
-    cell_.resize(size);
-    for (auto* column : {&near_inverse_, &far_inverse_, &forward_, &low_x_, &low_y_, &high_x_,
-                         &high_y_, &best_, &wanted_, &least_})
-      column->resize(size);
-  }
-  // The outer of the lanes has the least reach.
-  const RingRow& forward = rings.forward[high + low >= kLanes ? high : low];
-  for (std::size_t k = 0; k < kRings; ++k) {
+    first_[k] = wanted;
     std::int32_t sector = turns.middle + first_turn[k];
     if (sector < 0) sector += sectors;
     if (sector >= sectors) sector -= sectors;
-    for (std::size_t i = first_[k]; i < first_[k + 1]; ++i) {
-      const SectorBorders& border = borders[static_cast<std::size_t>(sector)];
-      const std::size_t cell = k * borders.size() + static_cast<std::size_t>(sector);
-      cell_[i] = static_cast<std::uint32_t>(cell);
-      near_inverse_[i] = rings.near_inverse[k], far_inverse_[i] = rings.far_inverse[k];
-      forward_[i] = forward[k];
-      low_x_[i] = border.low_x, low_y_[i] = border.low_y;
-      high_x_[i] = border.high_x, high_y_[i] = border.high_y;
+    for (std::int16_t turn = first_turn[k]; turn <= last_turn[k]; ++turn) {
+      const auto cell =
+          static_cast<std::uint32_t>(k * borders.size() + static_cast<std::size_t>(sector));
       const float bound = known.bounds[cell];
-      wanted_[i] = bound > slope_of_hint(known.least[cell]) ? bound - kSlopeTolerance : kNothing;
+      if (bound > slope_of_hint(known.least[cell])) {
+        const std::size_t i = wanted++;
+        const SectorBorders& border = borders[static_cast<std::size_t>(sector)];
+        cell_[i] = cell, turn_[i] = turn;
+        near_inverse_[i] = rings.near_inverse[k], far_inverse_[i] = rings.far_inverse[k];
+        forward_[i] = forward()[k];
+        low_x_[i] = border.low_x, low_y_[i] = border.low_y;
+        high_x_[i] = border.high_x, high_y_[i] = border.high_y;
+        best_[i] = kNothing;
+        wanted_[i] = bound - kSlopeTolerance;
+      }
       if (++sector == sectors) sector = 0;
     }
-    if (!whole) continue;
-    for (std::size_t i = first_[k]; i < first_[k + 1]; ++i) {
-      const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(whole->first_[k] + i - first_[k]) +
-                                first_turn[k] - whole->turn_[k];
-      best_[i] = at >= whole->first_[k] && at < whole->first_[k + 1]
-                     ? whole->best_[static_cast<std::size_t>(at)]
-                     : kNothing;
+  }
+  first_[kRings] = wanted;
+}
+
+void ReachedCells::reach_part(const ReachedCells& whole, std::size_t low, std::size_t high) {
+  make_room(whole.size());
+  rings_ = whole.rings_, turns_ = whole.turns_, low_ = low, high_ = high;
+  sectors_ = whole.sectors_, hints_ = whole.hints_, ring_best_ = whole.ring_best_;
+  const auto& first_turn = turns_->first[low];
+  const auto& last_turn = turns_->last[high];
+  std::uint32_t size = 0;
+  for (std::size_t k = 0; k < kRings; ++k) {
+    first_[k] = size;
+    for (std::size_t i = whole.first_[k]; i < whole.first_[k + 1]; ++i) {
+      if (whole.turn_[i] < first_turn[k] || whole.turn_[i] > last_turn[k] ||
+          !(whole.best_[i] < whole.wanted_[i]))
+        continue;
+      cell_[size] = whole.cell_[i], turn_[size] = whole.turn_[i];
+      near_inverse_[size] = rings_->near_inverse[k], far_inverse_[size] = rings_->far_inverse[k];
+      forward_[size] = forward()[k];
+      low_x_[size] = whole.low_x_[i], low_y_[size] = whole.low_y_[i];
+      high_x_[size] = whole.high_x_[i], high_y_[size] = whole.high_y_[i];
+      best_[size] = whole.best_[i], wanted_[size] = whole.wanted_[i];
+      ++size;
     }
   }
-  if (!whole) std::fill_n(best_.begin(), size, kNothing);
+  first_[kRings] = size;
 }
 
 void ReachedCells::raise(std::span<const CellPlane> planes, std::size_t first) {
@@ -177,6 +218,8 @@ void ReachedCells::raise(std::span<const CellPlane> planes, std::size_t first) {
   raise_cells({near_inverse_.data(), far_inverse_.data(), forward_.data(), low_x_.data(),
                low_y_.data(), high_x_.data(), high_y_.data()},
               planes.data(), planes.size(), first_[first], size(), least_.data(), best_.data());
+  raise_rings(*rings_, forward(), planes.data(), planes.size(), first, ring_least_.data(),
+              ring_best_.data());
 }
 
 bool ReachedCells::is_open(std::size_t first, std::size_t end) const {
@@ -193,6 +236,23 @@ bool ReachedCells::is_promising(float rise, float slope, std::size_t first, std:
 
 void ReachedCells::lower(float* bounds) const {
   for (std::size_t i = 0; i < size(); ++i) bounds[cell_[i]] = std::min(bounds[cell_[i]], best_[i]);
+  for (std::size_t k = 0; k < kRings; ++k) {
+    float* ring = bounds + k * static_cast<std::size_t>(sectors_);
+    const std::uint16_t* hints = hints_ + k * static_cast<std::size_t>(sectors_);
+    std::int32_t sector = turns_->middle + turns_->first[low_][k];
+    if (sector < 0) sector += sectors_;
+    if (sector >= sectors_) sector -= sectors_;
+    for (int turn = turns_->first[low_][k]; turn <= turns_->last[high_][k]; ++turn) {
+      if (!(ring[sector] > slope_of_hint(hints[sector])))
+        ring[sector] = std::min(ring[sector], ring_best_[k]);
+      if (++sector == sectors_) sector = 0;
+    }
+  }
+}
+
+void ReachedCells::lower_closed(float* bounds) const {
+  for (std::size_t i = 0; i < size(); ++i)
+    if (best_[i] >= wanted_[i]) bounds[cell_[i]] = std::min(bounds[cell_[i]], best_[i]);
 }
 
 }  // namespace scarp

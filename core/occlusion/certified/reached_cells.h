@@ -55,18 +55,24 @@ inline constexpr float kSlopeRounding = 0x1p-19F;
 
 /// The cells of cameras that rays over a piece lead to, ring by ring, and the best bound that is
 /// known for each: slopes that no camera under them sees the group over the piece.
+///
+/// Most cells are of no use: no camera can be there over ground and under what is known already.
+/// For these one bound for each ring does.
 class ReachedCells {
  public:
   /// What is known of the cells of a group from elsewhere.
   struct Known {
     const float* bounds;         ///< [kRings * sectors]: no higher one is of use
-    const std::uint16_t* least;  ///< [kRings * sectors]: nor one under this, as a SlopeHint
+    const std::uint16_t* least;  ///< [kRings * sectors]: nor one under this, as a slope_hint
   };
 
+  /// All cells that rays over a piece lead to.
   /// @param low, high  lanes that the rays pass the group's centre in
-  /// @param whole      those of the piece that this one is a part of, or nullptr
   void reach(const RingTable& rings, const Turns& turns, std::span<const SectorBorders> borders,
-             std::size_t low, std::size_t high, const Known& known, const ReachedCells* whole);
+             std::size_t low, std::size_t high, const Known& known);
+
+  /// Those of a piece's cells that are open, as far as rays over a part of it lead to them.
+  void reach_part(const ReachedCells& whole, std::size_t low, std::size_t high);
 
   /// Raises what is known of rings from `first` on to the lowest of some planes.
   void raise(std::span<const CellPlane> planes, std::size_t first);
@@ -78,18 +84,31 @@ class ReachedCells {
   /// over one of these bounds by more than a tolerance.
   bool is_promising(float rise, float slope, std::size_t first, std::size_t end) const;
 
-  /// Lowers a group's bounds to these.
+  /// Lowers a group's bounds to these. The bounds are those of `known`.
   void lower(float* bounds) const;
+  /// Where they are not open, that is.
+  void lower_closed(float* bounds) const;
 
  private:
   std::size_t size() const { return first_[kRings]; }
+  void make_room(std::size_t size);
+  /// The outer of the lanes has the least reach.
+  const RingRow& forward() const { return rings_->forward[high_ + low_ >= kLanes ? high_ : low_]; }
 
   std::array<std::uint32_t, kRings + 1> first_{};  // of each ring
-  std::array<std::int16_t, kRings> turn_{};        // of the first cell of each ring
   std::vector<std::uint32_t> cell_;                // in the group's bounds
+  std::vector<std::int16_t> turn_;
   std::vector<float> near_inverse_, far_inverse_, forward_;
   std::vector<float> low_x_, low_y_, high_x_, high_y_;  // SectorBorders
   std::vector<float> best_, wanted_, least_;
+
+  // The lanes, and bounds for whole rings of them.
+  const RingTable* rings_ = nullptr;
+  const Turns* turns_ = nullptr;
+  std::size_t low_ = 0, high_ = 0;
+  std::int32_t sectors_ = 0;
+  const std::uint16_t* hints_ = nullptr;
+  RingRow ring_best_{}, ring_least_{};
 };
 
 /// A slope in 16 bits, about: the upper half of a float.
