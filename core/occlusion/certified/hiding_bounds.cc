@@ -342,6 +342,7 @@ class Bounding {
     double slope = targets.plane ? targets.plane->ahead : -HUGE_VAL;
     double base_m = slope > -HUGE_VAL ? look.places.tangent_m(slope) : -HUGE_VAL;
     std::size_t ring = 0;  // all before have what they can get
+    std::size_t open_end = reached.end_of_open();
     const auto raise_before = [&](std::size_t end) {
       if (end > ring) {
         int raised = 0;
@@ -360,20 +361,21 @@ class Bounding {
     auto next = std::upper_bound(
         crossings.begin(), crossings.end(), near_u_m,
         [](double u_m, const RidgeCrossing& c) { return u_m < static_cast<double>(c.u_m); });
-    for (; next != crossings.end() && ring < kRings; ++next) {
+    for (; next != crossings.end() && ring < open_end; ++next) {
       const auto u_m = static_cast<double>(next->u_m), z_m = static_cast<double>(next->z_m);
       if (slope > -HUGE_VAL && !(z_m > base_m + slope * u_m)) continue;
       const std::size_t beyond = ring_beyond(u_m);
       if (beyond > ring) {
         raise_before(beyond);
-        if (!reached.is_open(ring, kRings)) return;
+        open_end = reached.end_of_open();
+        if (ring >= open_end) return;
       }
       slope = look.places.slope_to(u_m, z_m, kLatticeStepM);
       base_m = look.places.tangent_m(slope);
       const double rise_m = z_m + slope * (look.centre.u_m - u_m) - look.height_m;
       look.sighted.push_back({next->edge, slope, static_cast<float>(rise_m / look.radius_m)});
     }
-    raise_before(kRings);
+    raise_before(open_end);
   }
 
   /// Lowers the bounds of cells by what rays over a piece can see of the group. Looks closer, at

@@ -227,6 +227,13 @@ bool ReachedCells::is_open(std::size_t first, std::size_t end) const {
                      first_[end] - first_[first]);
 }
 
+std::size_t ReachedCells::end_of_open() const {
+  std::size_t i = size();
+  while (i > 0 && !(best_[i - 1] < wanted_[i - 1])) --i;
+  return static_cast<std::size_t>(std::lower_bound(first_.begin(), first_.end(), i) -
+                                  first_.begin());
+}
+
 bool ReachedCells::is_promising(float rise, float slope, std::size_t first, std::size_t end) const {
   const std::size_t begin = first_[first];
   const float* inverse = (rise < 0 ? far_inverse_ : near_inverse_).data() + begin;

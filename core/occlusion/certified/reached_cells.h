@@ -80,6 +80,9 @@ class ReachedCells {
   /// Whether a bound is short of what is of use, in rings from `first` to `end`.
   bool is_open(std::size_t first, std::size_t end) const;
 
+  /// One past the last ring with such a bound.
+  std::size_t end_of_open() const;
+
   /// Whether a line that rises by `slope`, and is `rise` over the group's height at its centre, is
   /// over one of these bounds by more than a tolerance.
   bool is_promising(float rise, float slope, std::size_t first, std::size_t end) const;
