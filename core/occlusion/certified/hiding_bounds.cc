@@ -30,6 +30,12 @@ constexpr float kEverything = std::numeric_limits<float>::infinity();
 /// An edge is halved this often at most.
 constexpr std::size_t kMostHalvings = 6;
 
+/// Cameras outside the data count as far out as this, in radii of the group.
+constexpr double kOutsideRadii = 2;
+
+/// As many ridges that carry no wall are taken out of sight, for what is behind them.
+constexpr int kMostFailures = 24;
+
 /// Ridges that are tried before a place goes without a wall.
 constexpr int kMostTries = 8;
 
@@ -138,7 +144,8 @@ class Bounding {
         for (const auto& [x, y] : directions) {
           const double x_m = circle.x_m + x * middle_m, y_m = circle.y_m + y * middle_m;
           *hint++ = slope_hint(kEverything);
-          if (!ground.is_inside(x_m, y_m)) continue;
+          const double beyond_m = kOutsideRadii * circle.radius_m;
+          if (!ground.is_inside(x_m - x * beyond_m, y_m - y * beyond_m)) continue;
           const double rise_m = ground.around(x_m, y_m, far_m - near_m) - bounds_.height_m[group];
           hint[-1] = slope_hint(static_cast<float>(rise_m / (rise_m < 0 ? near_m : far_m)));
         }
@@ -162,6 +169,7 @@ class Bounding {
     std::uint32_t edge;
     double slope;
     float rise;  // of its line over the group's height at the centre, in radii
+    std::ptrdiff_t crossing;
   };
 
   /// Works out one group for the rays of one fan.
@@ -182,6 +190,7 @@ class Bounding {
     std::array<ReachedCells, kMostHalvings + 1> reached_by_depth{};
     std::size_t depth = 0;  // of halving
     std::vector<Sighted> sighted{};
+    int failures = 0;  // of ridges to carry a wall
     std::vector<CellPlane> planes{};
     Wall wall{};
 
@@ -339,43 +348,59 @@ class Bounding {
     // A wall is raised on the last ridge before a ring that rises above all before it, if there
     // are rings for which it counts.
     look.sighted.clear();
-    double slope = targets.plane ? targets.plane->ahead : -HUGE_VAL;
-    double base_m = slope > -HUGE_VAL ? look.places.tangent_m(slope) : -HUGE_VAL;
+    const double first_slope = targets.plane ? targets.plane->ahead : -HUGE_VAL;
+    double slope = -HUGE_VAL, base_m = -HUGE_VAL;
+    const auto see_over = [&](double ridge_slope) {
+      slope = ridge_slope;
+      base_m = slope > -HUGE_VAL ? look.places.tangent_m(slope) : -HUGE_VAL;
+    };
+    see_over(first_slope);
     std::size_t ring = 0;  // all before have what they can get
     std::size_t open_end = reached.end_of_open();
+    /// @return whether the last ridge carries a wall, if one is wanted
     const auto raise_before = [&](std::size_t end) {
-      if (end > ring) {
-        int raised = 0;
-        const std::size_t tries = std::min<std::size_t>(kMostTries, look.sighted.size());
-        for (std::size_t i = 1; i <= tries; ++i) {
-          const Sighted& sighted = look.sighted[look.sighted.size() - i];
-          if (!reached.is_promising(sighted.rise, static_cast<float>(sighted.slope), ring, end))
-            break;
-          if (raise(sighted) && ++raised == 2) break;
-        }
+      int raised = 0;
+      const std::size_t tries = std::min<std::size_t>(kMostTries, look.sighted.size());
+      for (std::size_t i = 1; i <= tries && raised < 2; ++i) {
+        const Sighted& sighted = look.sighted[look.sighted.size() - i];
+        if (!reached.is_promising(sighted.rise, static_cast<float>(sighted.slope), ring, end))
+          break;
+        if (raise(sighted))
+          ++raised;
+        else if (i == 1 && look.failures < kMostFailures)
+          return false;
       }
-      ring = std::max(ring, end);
+      return true;
     };
-    const double near_u_m = std::max(piece.a.u_m, piece.b.u_m);
     const auto crossings = look.ridges.along((piece.a.v_m + piece.b.v_m) / 2);
     auto next = std::upper_bound(
-        crossings.begin(), crossings.end(), near_u_m,
+        crossings.begin(), crossings.end(), std::max(piece.a.u_m, piece.b.u_m),
         [](double u_m, const RidgeCrossing& c) { return u_m < static_cast<double>(c.u_m); });
-    for (; next != crossings.end() && ring < open_end; ++next) {
-      const auto u_m = static_cast<double>(next->u_m), z_m = static_cast<double>(next->z_m);
-      if (slope > -HUGE_VAL && !(z_m > base_m + slope * u_m)) continue;
-      const std::size_t beyond = ring_beyond(u_m);
-      if (beyond > ring) {
-        raise_before(beyond);
+    for (look.failures = 0; ring < open_end; ++next) {
+      while (next != crossings.end() && slope > -HUGE_VAL &&
+             !(static_cast<double>(next->z_m) > base_m + slope * static_cast<double>(next->u_m)))
+        ++next;
+      const bool is_last = next == crossings.end();
+      const std::size_t end = is_last ? open_end : ring_beyond(static_cast<double>(next->u_m));
+      if (end > ring) {
+        if (!raise_before(end)) {
+          // As if the ridge were not there: it hid others from view.
+          ++look.failures;
+          next = crossings.begin() + look.sighted.back().crossing;
+          look.sighted.pop_back();
+          see_over(look.sighted.empty() ? first_slope : look.sighted.back().slope);
+          continue;
+        }
+        ring = end;
         open_end = reached.end_of_open();
-        if (ring >= open_end) return;
       }
-      slope = look.places.slope_to(u_m, z_m, kLatticeStepM);
-      base_m = look.places.tangent_m(slope);
+      if (is_last) return;
+      const auto u_m = static_cast<double>(next->u_m), z_m = static_cast<double>(next->z_m);
+      see_over(look.places.slope_to(u_m, z_m, kLatticeStepM));
       const double rise_m = z_m + slope * (look.centre.u_m - u_m) - look.height_m;
-      look.sighted.push_back({next->edge, slope, static_cast<float>(rise_m / look.radius_m)});
+      look.sighted.push_back({next->edge, slope, static_cast<float>(rise_m / look.radius_m),
+                              next - crossings.begin()});
     }
-    raise_before(open_end);
   }
 
   /// Lowers the bounds of cells by what rays over a piece can see of the group. Looks closer, at
