@@ -348,7 +348,7 @@ class Bounding {
     // A wall is raised on the last ridge before a ring that rises above all before it, if there
     // are rings for which it counts.
     look.sighted.clear();
-    const double first_slope = targets.plane ? targets.plane->ahead : -HUGE_VAL;
+    const double first_slope = targets.plane ? targets.plane->line_slope : -HUGE_VAL;
     double slope = -HUGE_VAL, base_m = -HUGE_VAL;
     const auto see_over = [&](double ridge_slope) {
       slope = ridge_slope;
