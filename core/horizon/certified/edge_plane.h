@@ -19,8 +19,8 @@ struct SkyPlane {
   double u_m, v_m, height_m;
   double ahead, left;
   double error_m, slope_error;
-  /// Along any ray of the fan that crosses the edge within a beam the plane is nowhere lower than
-  /// line_m + line_slope * u, where it is beyond the edge.
+  /// The same in another form: a camera beyond the edge and strictly under line_m + line_slope * u
+  /// is hidden, too, on any ray of the fan that crosses the edge within a beam.
   double line_m, line_slope;
 };
 

@@ -8,11 +8,11 @@
 namespace scarp {
 namespace {
 
-/// A chain is followed this far each way.
+/// Edges that are tried each way.
 constexpr int kMostSteps = 48;
 
-/// A chain must not run nearly along the fan: its edges turn from the axis by this tangent at
-/// least. Guides the search; that rays cross an edge one way is asked for besides.
+/// A chain should not run nearly along the fan: its edges turn from the axis by this tangent at
+/// least, where there are such edges. Guides the search.
 constexpr double kLeastTurn = 0.3;
 
 class Chain {
@@ -36,8 +36,8 @@ class Chain {
  private:
   const FanPlace& place(VertexIndex v) const { return view_.vertices[v]; }
 
-  /// Whether all rays of the fan cross an edge from behind to beyond; p has the lesser v.
-  bool is_crossed(const FanPlace& p, const FanPlace& q) const {
+  /// Whether an edge leads across the fan; p has the lesser v.
+  bool is_across(const FanPlace& p, const FanPlace& q) const {
     const double least = std::max(view_.fan.tan_half, kLeastTurn);
     return q.v_m - p.v_m > std::abs(q.u_m - p.u_m) * least + 8 * view_.error_m;
   }
@@ -66,7 +66,9 @@ class Chain {
     return true;
   }
 
-  /// The edge that rises most across the beam, as sight lines of the slope see it.
+  /// The edge that rises most across the beam, as sight lines of the slope see it; where none leads
+  /// across, the one that ends highest.
+  /// @param left  not to these
   std::optional<VertexIndex> highest_from(VertexIndex v, int side,
                                           std::span<const VertexIndex> left) const {
     const FanPlace& p = place(v);
@@ -77,7 +79,7 @@ class Chain {
       if (!(side > 0 ? is_rising(p, q) : is_rising(q, p))) continue;
       if (std::find(left.begin(), left.end(), other) != left.end()) continue;
       const double above_m = q.z_m - p.z_m - slope_ * (q.u_m - p.u_m);
-      if (!(side > 0 ? is_crossed(p, q) : is_crossed(q, p))) {
+      if (!(side > 0 ? is_across(p, q) : is_across(q, p))) {
         if (above_m > other_best_rise) other_best = other, other_best_rise = above_m;
         continue;
       }
@@ -92,6 +94,23 @@ class Chain {
   const Beam& beam_;
   double slope_;
 };
+
+/// The plane that an edge of the chain holds, with the better of two lines along rays.
+std::optional<SkyPlane> plane_over(const FanView& view, const std::array<FanPlace, 2>& edge,
+                                   const std::array<FanPlace, 2>& part, const Places& targets) {
+  EdgePlane through_edge(view, edge[0], edge[1]);
+  through_edge.hold(targets);
+  CurtainPlane curtain(view, part[0], part[1]);
+  curtain.hold(targets);
+  if (!through_edge.is_held())
+    return curtain.is_held() ? std::optional(curtain.plane()) : std::nullopt;
+  SkyPlane plane = through_edge.plane(part[0], part[1]);
+  if (!curtain.is_held()) return plane;
+  const SkyPlane level = curtain.plane();
+  if (level.line_slope > plane.line_slope)
+    plane.line_slope = level.line_slope, plane.line_m = level.line_m;
+  return plane;
+}
 
 }  // namespace
 
@@ -108,28 +127,13 @@ bool raise_wall(const RidgeEdges& ridges, const FanView& view, const Beam& beam,
     cut(beam.high.at(a), beam.high.at(b), from, to);
     if (!(from <= to)) continue;
     const std::array<FanPlace, 2> ends{between(a, b, from), between(a, b, to)};
-    EdgePlane plane(view, a, b);
-    plane.hold(targets);
     for (const FanPlace& end : ends) {
       if (!(beam.ahead.at(end) > 8 * view.error_m)) return false;
       wall.u_m = std::max(wall.u_m, end.u_m);
     }
-    if (plane.is_held()) {
-      wall.planes.push_back(plane.plane(ends[0], ends[1]));
-    }
-    CurtainPlane curtain(view, ends[0], ends[1]);
-    curtain.hold(targets);
-    if (plane.is_held()) {
-      if (!curtain.is_held()) continue;
-      const SkyPlane level = curtain.plane();
-      SkyPlane& sky = wall.planes.back();
-      if (level.line_slope > sky.line_slope) {
-        sky.line_slope = level.line_slope, sky.line_m = level.line_m;
-      }
-      continue;
-    }
-    if (!curtain.is_held()) return false;
-    wall.planes.push_back(curtain.plane());
+    const auto plane = plane_over(view, {a, b}, ends, targets);
+    if (!plane) return false;
+    wall.planes.push_back(*plane);
   }
   return !wall.planes.empty();
 }

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
 #include <utility>
 
 #include "core/horizon/certified/fan.h"
@@ -270,7 +269,7 @@ class Bounding {
     return false;
   }
 
-  /// The cells that rays over a piece lead to, with what is known of the piece that it is half of.
+  /// The cells that rays over a piece lead to; of a half, those that the whole leaves open.
   /// @return the lane whose reach holds for all these rays
   std::size_t reach_from(Look& look, const ExitPiece& piece) const {
     const FanView& view = look.view;
