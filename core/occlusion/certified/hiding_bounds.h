@@ -14,7 +14,7 @@ namespace scarp {
 
 /// How finely hiding is bounded. Every setting is safe; finer ones find more.
 struct HidingOptions {
-  std::int32_t fans = 256;     ///< of directions; a multiple of 8
+  std::int32_t fans = 128;     ///< of directions; a multiple of 8
   std::int32_t sectors = 248;  ///< of camera azimuths around a group
   double piece = 0.5;   ///< greatest length of what is looked at by itself of a group's border, in
                         ///< mean distances between vertices
