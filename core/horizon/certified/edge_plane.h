@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/horizon/certified/fan.h"
+#include "core/horizon/certified/places.h"
 
 namespace scarp {
 
@@ -18,8 +19,8 @@ struct SkyPlane {
   double u_m, v_m, height_m;
   double ahead, left;
   double error_m, slope_error;
-  /// Along any ray of the fan that crosses the edge within a beam the plane is nowhere lower than
-  /// line_m + line_slope * u, where it is beyond the edge.
+  /// The same in another form: a camera beyond the edge and strictly under line_m + line_slope * u
+  /// is hidden, too, on any ray of the fan that crosses the edge within a beam.
   double line_m, line_slope;
 };
 
@@ -59,6 +60,13 @@ class EdgePlane {
     rise_ = rise < rise_ ? rise : rise_;
   }
 
+  /// Has all of some places on or under the plane.
+  void hold(const Places& places) {
+    const double rise = places.least_rise(
+        {a_.u_m, a_.v_m, a_.z_m, eu_, ev_, along_, error_m_, height_error_m_, kTooNear * error_m_});
+    rise_ = rise < rise_ ? rise : rise_;
+  }
+
   /// The plane has to pass under everything: it is of no use.
   void give_up() { rise_ = -HUGE_VAL; }
   /// Whether it has held a place, and none that it could not.
@@ -89,6 +97,55 @@ class EdgePlane {
   const FanPlace a_;
   double eu_, ev_, along_, error_m_, height_error_m_;
   double rise_ = HUGE_VAL;  // outwards, square to the edge
+};
+
+/// The plane level across the fan that stands on a part of an edge and has all of some places under
+/// it, whichever way rays of the fan cross the edge. A camera with u beyond the edge's, strictly
+/// under the plane, whose sight line to such a place passes the part, does not see the place.
+///
+/// Along a ray height is linear in u, so the line from a place p over a place x of the edge rises
+/// by (z_x - z_p) / (u_x - u_p). That is monotone along the edge and between places: the least is
+/// at corners. Side: never above the true plane. Accuracy: the rounding of the fan's frame, over
+/// the way from a place to the edge.
+class CurtainPlane {
+ public:
+  CurtainPlane(const FanView& view, const FanPlace& from, const FanPlace& to)
+      : view_(view), near_(from.u_m < to.u_m ? from : to), far_(from.u_m < to.u_m ? to : from) {}
+
+  /// Has all of some places on or under the plane. One that is too near, or beyond, cannot be.
+  void hold(const Places& places) {
+    const double error_m = 8 * view_.error_m;
+    for (const FanPlace& end : {near_, far_}) {
+      const double slope =
+          places.least_slope(end, error_m, 4 * view_.height_error_m, kTooNear * error_m);
+      slope_ = slope < slope_ ? slope : slope_;
+    }
+  }
+
+  bool is_held() const { return slope_ > -HUGE_VAL && slope_ < HUGE_VAL; }
+
+  /// Requires is_held().
+  SkyPlane plane() const {
+    const double steepness = std::abs(slope_);
+    const double height_m = std::min(far_.z_m, near_.z_m + slope_ * (far_.u_m - near_.u_m));
+    SkyPlane plane{far_.u_m,
+                   far_.v_m,
+                   height_m,
+                   slope_,
+                   0,
+                   4 * view_.height_error_m + steepness * 16 * view_.error_m,
+                   steepness * 0x1p-44,
+                   0,
+                   0};
+    plane.line_slope = slope_ - plane.slope_error;
+    plane.line_m = height_m - plane.line_slope * far_.u_m - 2 * plane.error_m;
+    return plane;
+  }
+
+ private:
+  const FanView& view_;
+  const FanPlace near_, far_;
+  double slope_ = HUGE_VAL;
 };
 
 }  // namespace scarp

@@ -8,11 +8,11 @@
 namespace scarp {
 namespace {
 
-/// A chain is followed this far each way.
-constexpr int kMostSteps = 12;
+/// Edges that are tried each way.
+constexpr int kMostSteps = 48;
 
-/// A chain must not run nearly along the fan: its edges turn from the axis by this tangent at
-/// least. Guides the search; that rays cross an edge one way is asked for besides.
+/// A chain should not run nearly along the fan: its edges turn from the axis by this tangent at
+/// least, where there are such edges. Guides the search.
 constexpr double kLeastTurn = 0.3;
 
 class Chain {
@@ -25,7 +25,7 @@ class Chain {
   bool follow(const RidgeEdges::Edge& edge, std::vector<VertexIndex>& vertices) const {
     VertexIndex low = edge[0], high = edge[1];
     if (place(low).v_m > place(high).v_m) std::swap(low, high);
-    if (!is_crossed(place(low), place(high))) return false;
+    if (!is_rising(place(low), place(high))) return false;
     vertices.assign(1, low);
     if (!extend(beam_.low, -1, vertices)) return false;
     std::reverse(vertices.begin(), vertices.end());
@@ -36,34 +36,57 @@ class Chain {
  private:
   const FanPlace& place(VertexIndex v) const { return view_.vertices[v]; }
 
-  /// Whether all rays of the fan cross an edge from behind to beyond; p has the lesser v.
-  bool is_crossed(const FanPlace& p, const FanPlace& q) const {
+  /// Whether an edge leads across the fan; p has the lesser v.
+  bool is_across(const FanPlace& p, const FanPlace& q) const {
     const double least = std::max(view_.fan.tan_half, kLeastTurn);
     return q.v_m - p.v_m > std::abs(q.u_m - p.u_m) * least + 8 * view_.error_m;
   }
 
-  /// Appends vertices until one lies beyond a side of the beam.
+  bool is_rising(const FanPlace& p, const FanPlace& q) const {
+    return q.v_m - p.v_m > 8 * view_.error_m;
+  }
+
+  /// Appends vertices until one lies beyond a side of the beam. Goes back from where no edge leads
+  /// on, such as a tip of ground in a void.
   bool extend(const HalfPlane& side_line, int side, std::vector<VertexIndex>& vertices) const {
+    const std::size_t begin = vertices.size();
+    std::array<VertexIndex, kMostSteps> left;  // where it has been in vain
+    std::size_t left_count = 0;
     for (int steps = 0; side_line.at(place(vertices.back())) >= 0; ++steps) {
-      const auto next = highest_from(vertices.back(), side);
-      if (!next || steps == kMostSteps) return false;
-      vertices.push_back(*next);
+      if (steps == kMostSteps) return false;
+      const auto next = highest_from(vertices.back(), side, {left.data(), left_count});
+      if (next) {
+        vertices.push_back(*next);
+        continue;
+      }
+      if (vertices.size() == begin) return false;
+      left[left_count++] = vertices.back();
+      vertices.pop_back();
     }
     return true;
   }
 
-  /// The edge that rises most across the beam, as sight lines of the slope see it.
-  std::optional<VertexIndex> highest_from(VertexIndex v, int side) const {
+  /// The edge that rises most across the beam, as sight lines of the slope see it; where none leads
+  /// across, the one that ends highest.
+  /// @param left  not to these
+  std::optional<VertexIndex> highest_from(VertexIndex v, int side,
+                                          std::span<const VertexIndex> left) const {
     const FanPlace& p = place(v);
-    std::optional<VertexIndex> best;
-    double best_rise = -HUGE_VAL;
+    std::optional<VertexIndex> best, other_best;
+    double best_rise = -HUGE_VAL, other_best_rise = -HUGE_VAL;
     for (const VertexIndex other : ridges_.around_of(v)) {
       const FanPlace& q = place(other);
-      if (!(side > 0 ? is_crossed(p, q) : is_crossed(q, p))) continue;
-      const double rise = (q.z_m - p.z_m - slope_ * (q.u_m - p.u_m)) / std::abs(q.v_m - p.v_m);
+      if (!(side > 0 ? is_rising(p, q) : is_rising(q, p))) continue;
+      if (std::find(left.begin(), left.end(), other) != left.end()) continue;
+      const double above_m = q.z_m - p.z_m - slope_ * (q.u_m - p.u_m);
+      if (!(side > 0 ? is_across(p, q) : is_across(q, p))) {
+        if (above_m > other_best_rise) other_best = other, other_best_rise = above_m;
+        continue;
+      }
+      const double rise = above_m / std::abs(q.v_m - p.v_m);
       if (rise > best_rise) best = other, best_rise = rise;
     }
-    return best;
+    return best ? best : other_best;
   }
 
   const RidgeEdges& ridges_;
@@ -72,10 +95,27 @@ class Chain {
   double slope_;
 };
 
+/// The plane that an edge of the chain holds, with the better of two lines along rays.
+std::optional<SkyPlane> plane_over(const FanView& view, const std::array<FanPlace, 2>& edge,
+                                   const std::array<FanPlace, 2>& part, const Places& targets) {
+  EdgePlane through_edge(view, edge[0], edge[1]);
+  through_edge.hold(targets);
+  CurtainPlane curtain(view, part[0], part[1]);
+  curtain.hold(targets);
+  if (!through_edge.is_held())
+    return curtain.is_held() ? std::optional(curtain.plane()) : std::nullopt;
+  SkyPlane plane = through_edge.plane(part[0], part[1]);
+  if (!curtain.is_held()) return plane;
+  const SkyPlane level = curtain.plane();
+  if (level.line_slope > plane.line_slope)
+    plane.line_slope = level.line_slope, plane.line_m = level.line_m;
+  return plane;
+}
+
 }  // namespace
 
 bool raise_wall(const RidgeEdges& ridges, const FanView& view, const Beam& beam,
-                std::span<const FanPlace> targets, std::uint32_t edge, double slope, Wall& wall) {
+                const Places& targets, std::uint32_t edge, double slope, Wall& wall) {
   const std::vector<VertexIndex>& chain = wall.chain;
   if (!Chain(ridges, view, beam, slope).follow(ridges.edges[edge], wall.chain)) return false;
   wall.u_m = -HUGE_VAL;
@@ -87,14 +127,13 @@ bool raise_wall(const RidgeEdges& ridges, const FanView& view, const Beam& beam,
     cut(beam.high.at(a), beam.high.at(b), from, to);
     if (!(from <= to)) continue;
     const std::array<FanPlace, 2> ends{between(a, b, from), between(a, b, to)};
-    EdgePlane plane(view, a, b);
-    for (const FanPlace& target : targets) plane.hold(target);
-    if (!plane.is_held()) return false;
     for (const FanPlace& end : ends) {
       if (!(beam.ahead.at(end) > 8 * view.error_m)) return false;
       wall.u_m = std::max(wall.u_m, end.u_m);
     }
-    wall.planes.push_back(plane.plane(ends[0], ends[1]));
+    const auto plane = plane_over(view, {a, b}, ends, targets);
+    if (!plane) return false;
+    wall.planes.push_back(*plane);
   }
   return !wall.planes.empty();
 }

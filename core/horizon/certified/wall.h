@@ -6,6 +6,7 @@
 
 #include "core/horizon/certified/edge_plane.h"
 #include "core/horizon/certified/fan.h"
+#include "core/horizon/certified/places.h"
 #include "core/horizon/certified/ridges.h"
 
 namespace scarp {
@@ -43,18 +44,22 @@ struct Wall {
 };
 
 /// Raises a wall on a ridge: follows it both ways, along the edges that look highest, until it
-/// spans the beam, and hangs from each of its edges the plane that has all targets under it.
+/// spans the beam, and hangs from each of its edges the plane that has all targets under it: the
+/// plane through the edge where all targets are behind it (EdgePlane), and one level across the fan
+/// where they are not, as from an edge that leads along the fan round a void (CurtainPlane).
 ///
-/// Why it is right. Each edge is crossed by rays of the fan from behind to beyond only, and the
-/// chain runs from one side of the beam to the other, so every ray crosses one of its edges after
-/// it has come through what the beam begins with. Under that edge's plane it is hidden
-/// (EdgePlane), and a camera under all of the planes is.
+/// Why it is right. What of the chain is within the beam lies ahead of where the beam begins and
+/// nearer than wall.u_m, and leads from one side of the beam to the other, so every ray to a camera
+/// beyond wall.u_m crosses it after it has come through what the beam begins with. Where it
+/// crosses an EdgePlane's edge it comes from behind, since all targets are there; a CurtainPlane
+/// holds whichever way it is crossed. Under that edge's plane the ray is stopped, and a camera
+/// under all of the planes sees none of the targets.
 ///
 /// @param targets  all that may be seen, as the corners of its hull, heights rounded up
 /// @param slope    of the sight lines that the wall is to stop; guides where the chain goes
 /// @return whether there is such a wall
 /// Side: planes never above the true ones. Cost: O(chain * (targets + edges at a vertex)).
 bool raise_wall(const RidgeEdges& ridges, const FanView& view, const Beam& beam,
-                std::span<const FanPlace> targets, std::uint32_t edge, double slope, Wall& wall);
+                const Places& targets, std::uint32_t edge, double slope, Wall& wall);
 
 }  // namespace scarp

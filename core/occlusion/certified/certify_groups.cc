@@ -7,6 +7,7 @@
 #include <limits>
 #include <vector>
 
+#include "core/threads/for_each_target.h"
 #include "core/threads/parallel_for.h"
 
 namespace scarp {
@@ -20,17 +21,42 @@ constexpr double kHeadroomM = 2000;
 /// Cameras outside the data count little, but they count.
 constexpr double kOutsideWeight = 1e-6;
 
+/// Rings are joined one by one where least is lost, until there are so few runs that the best way
+/// to join these can be found.
+constexpr std::size_t kFewRuns = 20;
+
+/// Sums are taken in so many parts, side by side.
+constexpr std::size_t kParts = 8;
+
 struct Axis {
   double x, y;
 };
 
-/// A run of rings that share one slope, and what is lost by that.
+/// A run of rings that share one slope, and what that is worth.
 struct Run {
   std::int32_t first;
-  double least;   // slope
-  double wanted;  // sum over rings of what their own bounds are worth
-  double cost;    // what of it the run's slope loses
+  double least;  // slope
+  double worth;
 };
+
+/// What cameras a slope can hide over the ground of rings: sqrt of the height over ground, weighed.
+SCARP_FOR_EACH_TARGET
+float worth_of_rings(const float* middle_m, const float* low_m, const float* weight, float slope,
+                     std::size_t first, std::size_t end) {
+  float parts[kParts] = {};
+  for (std::size_t k = first; k < end; k += kParts)
+    for (std::size_t j = 0; j < kParts; ++j) {
+      const float above_m = slope * middle_m[k + j] - low_m[k + j];
+      const float high_m = above_m > 0 ? above_m : 0;
+      const float reach_m =
+          high_m < static_cast<float>(kHeadroomM) ? high_m : static_cast<float>(kHeadroomM);
+      const float worth = weight[k + j] * std::sqrt(reach_m);
+      parts[j] += k + j < end ? worth : 0;
+    }
+  float sum = 0;
+  for (const float part : parts) sum += part;
+  return sum;
+}
 
 /// What bounds are worth in one sector: how many cameras they can hide.
 class Worth {
@@ -50,25 +76,23 @@ class Worth {
       const double x_m = circle_.x_m + direction.x * middle_m;
       const double y_m = circle_.y_m + direction.y * middle_m;
       floor_m_[k] = ground_.around(x_m, y_m, size_m);
-      weight_[k] = (ground_.is_inside(x_m, y_m) ? 1 : kOutsideWeight) * middle_m * size_m /
-                   (start_m_[0] * start_m_[0]);
+      middle_m_[k] = static_cast<float>(middle_m);
+      low_m_[k] = static_cast<float>(floor_m_[k] - height_m_);
+      weight_[k] = static_cast<float>((ground_.is_inside(x_m, y_m) ? 1 : kOutsideWeight) *
+                                      middle_m * size_m / (start_m_[0] * start_m_[0]));
     }
   }
 
-  /// Slopes that matter in a ring: below, cameras would be under ground; above, there are none.
-  double low_slope(std::size_t k) const {
-    const double rise_m = floor_m_[k] - height_m_;
-    return rise_m / start_m_[rise_m < 0 ? k : k + 1];
-  }
+  /// Above, there are no cameras.
   double high_slope(std::size_t k) const {
     return (ground_.highest_m() + kHeadroomM - height_m_) / start_m_[k];
   }
 
-  double of(double slope, std::size_t k) const {
-    const double middle_m = (start_m_[k] + start_m_[k + 1]) / 2;
-    const double above_m = height_m_ + slope * middle_m - floor_m_[k];
-    if (!(above_m > 0)) return 0;
-    return weight_[k] * std::sqrt(std::min(above_m, kHeadroomM));
+  /// Of one slope in rings from `first` to `last`.
+  double of(double slope, std::size_t first, std::size_t last) const {
+    if (!(slope > -HUGE_VAL)) return 0;
+    return static_cast<double>(worth_of_rings(middle_m_.data(), low_m_.data(), weight_.data(),
+                                              static_cast<float>(slope), first, last + 1));
   }
 
  private:
@@ -76,60 +100,86 @@ class Worth {
   const Circle circle_;
   const double height_m_;
   std::array<double, kRings + 1> start_m_{};
-  std::array<double, kRings> floor_m_{}, weight_{};
+  std::array<double, kRings> floor_m_{};
+  // As many more as a sum may read beyond the last.
+  std::array<float, kRings + kParts> middle_m_{}, low_m_{}, weight_{};
 };
 
 /// Shares the rings of a sector out to kSteps runs so that least is lost.
-/// Cost: O(kRings^2 * (kSteps + falls of the slope)).
+/// Cost: O(kRings + kFewRuns^2 * kSteps) sums over a run.
 class Joining {
  public:
-  Joining(const Worth& worth, std::span<const float> slopes) : slopes_(slopes) {
-    for (std::size_t first = 0; first < kRings; ++first) weigh_runs_from(worth, first);
+  Joining(const Worth& worth, std::span<const float> slopes) : worth_(worth) {
+    for (std::size_t k = 0; k < kRings; ++k) {
+      const auto slope = static_cast<double>(slopes[k]);
+      runs_.push_back({static_cast<std::int32_t>(k), slope, worth.of(slope, k, k)});
+    }
+    join_cheapest();
   }
 
   std::array<Run, kSteps> join() const {
-    // lost[n][end]: the least that n runs lose of the rings before `end`; begin: of the last one.
-    std::array<std::array<double, kRings + 1>, kSteps + 1> lost;
-    std::array<std::array<std::size_t, kRings + 1>, kSteps + 1> begin{};
-    for (auto& row : lost) row.fill(HUGE_VAL);
-    lost[0][0] = 0;
-    for (std::size_t n = 1; n <= kSteps; ++n)
-      for (std::size_t end = n; end <= kRings; ++end)
-        for (std::size_t first = n - 1; first < end; ++first) {
-          const double loss = lost[n - 1][first] + runs_[first][end - 1].cost;
-          if (loss < lost[n][end]) lost[n][end] = loss, begin[n][end] = first;
-        }
-    std::array<Run, kSteps> joined;
-    std::size_t end = kRings;
+    // kept[n][end]: the most that n runs keep of what is before `end`; begin: of the last one.
+    std::array<std::array<double, kFewRuns + 1>, kSteps + 1> kept;
+    std::array<std::array<std::size_t, kFewRuns + 1>, kSteps + 1> begin{};
+    for (auto& row : kept) row.fill(-HUGE_VAL);
+    kept[0][0] = 0;
+    for (std::size_t first = 0; first < kFewRuns; ++first) {
+      Run run = runs_[first];
+      for (std::size_t end = first + 1; end <= kFewRuns; ++end) {
+        if (end > first + 1) run = joined(run, runs_[end - 1], last_of(end - 1));
+        for (std::size_t n = 1; n <= kSteps; ++n)
+          if (kept[n - 1][first] + run.worth > kept[n][end])
+            kept[n][end] = kept[n - 1][first] + run.worth, begin[n][end] = first;
+      }
+    }
+    std::array<Run, kSteps> best;
+    std::size_t end = kFewRuns;
     for (std::size_t n = kSteps; n > 0; --n) {
       const std::size_t first = begin[n][end];
-      joined[n - 1] = runs_[first][end - 1];
+      best[n - 1] = runs_[first];
+      for (std::size_t i = first + 1; i < end; ++i)
+        best[n - 1] = joined(best[n - 1], runs_[i], last_of(i));
       end = first;
     }
-    return joined;
+    return best;
   }
 
  private:
-  void weigh_runs_from(const Worth& worth, std::size_t first) {
-    double wanted = 0, kept = 0;
-    double least = HUGE_VAL;
-    for (std::size_t last = first; last < kRings; ++last) {
-      const auto slope = static_cast<double>(slopes_[last]);
-      // A bound that is of no use here may still let a run pass over the ring.
-      if (slope >= worth.low_slope(last)) wanted += worth.of(slope, last);
-      if (slope < least) {
-        least = slope;
-        kept = 0;
-        for (std::size_t k = first; k <= last && least > -HUGE_VAL; ++k) kept += worth.of(least, k);
-      } else if (least > -HUGE_VAL) {
-        kept += worth.of(least, last);
-      }
-      runs_[first][last] = {static_cast<std::int32_t>(first), least, wanted, wanted - kept};
+  std::size_t last_of(std::size_t run) const {
+    return run + 1 < runs_.size() ? static_cast<std::size_t>(runs_[run + 1].first) - 1 : kRings - 1;
+  }
+
+  /// @param last  ring of the second run
+  Run joined(const Run& run, const Run& next, std::size_t last) const {
+    if (next.least >= run.least)
+      return {run.first, run.least,
+              run.worth + worth_.of(run.least, static_cast<std::size_t>(next.first), last)};
+    return {run.first, next.least,
+            worth_.of(next.least, static_cast<std::size_t>(run.first),
+                      static_cast<std::size_t>(next.first) - 1) +
+                next.worth};
+  }
+
+  void join_cheapest() {
+    std::vector<double> loss(runs_.size() - 1);
+    const auto weigh = [&](std::size_t i) {
+      loss[i] = runs_[i].worth + runs_[i + 1].worth -
+                joined(runs_[i], runs_[i + 1], last_of(i + 1)).worth;
+    };
+    for (std::size_t i = 0; i < loss.size(); ++i) weigh(i);
+    while (runs_.size() > kFewRuns) {
+      const auto i =
+          static_cast<std::size_t>(std::min_element(loss.begin(), loss.end()) - loss.begin());
+      runs_[i] = joined(runs_[i], runs_[i + 1], last_of(i + 1));
+      runs_.erase(runs_.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+      loss.erase(loss.begin() + static_cast<std::ptrdiff_t>(i));
+      if (i < loss.size()) weigh(i);
+      if (i > 0) weigh(i - 1);
     }
   }
 
-  std::span<const float> slopes_;
-  std::array<std::array<Run, kRings>, kRings> runs_;  // [first][last]
+  const Worth& worth_;
+  std::vector<Run> runs_;
 };
 
 /// Middle directions of the sectors.
@@ -171,7 +221,7 @@ void compress_group(const HidingBounds& bounds, const LeastGround& ground,
     for (Run& run : runs[s]) {
       // A finer scale is worth more than slopes that are of use to no camera.
       run.least = std::min(run.least, worth.high_slope(static_cast<std::size_t>(run.first)));
-      if (run.wanted - run.cost <= 0) run.least = -HUGE_VAL;
+      if (run.worth <= 0) run.least = -HUGE_VAL;
       if (run.least == -HUGE_VAL) continue;
       low = std::min(low, run.least);
       high = std::max(high, run.least);

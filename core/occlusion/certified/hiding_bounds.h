@@ -14,7 +14,7 @@ namespace scarp {
 
 /// How finely hiding is bounded. Every setting is safe; finer ones find more.
 struct HidingOptions {
-  std::int32_t fans = 256;     ///< of directions; a multiple of 8
+  std::int32_t fans = 128;     ///< of directions; a multiple of 8
   std::int32_t sectors = 248;  ///< of camera azimuths around a group
   double piece = 0.5;   ///< greatest length of what is looked at by itself of a group's border, in
                         ///< mean distances between vertices
@@ -46,9 +46,11 @@ struct HidingBounds {
 /// camera sees something of a group exactly where nothing beyond rises above its tangent to the
 /// hull of the group's slice.
 ///
+/// Work goes only where a camera over the ground, or near the data, can use a bound (ReachedCells).
+///
 /// Side: never more than is hidden. The same bits for any number of threads.
 /// Requires tin.neighbours, a group or kNone for each triangle, groups that have one.
-/// Cost: about fans * 3 us a triangle, and 256 bytes for each group and sector.
+/// Cost: about fans * 1.5 us a triangle, and 384 bytes for each group and sector.
 /// Source: own; supporting planes as in Law and Tan 1999, for one ridge and all of a group's
 /// ground.
 HidingBounds bound_hiding(const Tin& tin, std::span<const GroupIndex> group_of_triangle,

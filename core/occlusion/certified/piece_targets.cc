@@ -97,21 +97,4 @@ void find_targets(const FanView& view, const ExitPiece& piece, std::span<const F
   for (FanPlace& place : targets.places) place.z_m += 2 * view.height_error_m;
 }
 
-void leave_upper_hull(std::vector<FanPlace>& places) {
-  std::sort(places.begin(), places.end(), [](const FanPlace& p, const FanPlace& q) {
-    return p.u_m < q.u_m || (p.u_m == q.u_m && p.z_m > q.z_m);
-  });
-  std::size_t kept = 0;
-  for (const FanPlace& place : places) {
-    if (kept > 0 && places[kept - 1].u_m == place.u_m) continue;
-    while (kept > 1) {
-      const FanPlace &p = places[kept - 2], &q = places[kept - 1];
-      if ((q.z_m - p.z_m) * (place.u_m - p.u_m) > (place.z_m - p.z_m) * (q.u_m - p.u_m)) break;
-      --kept;
-    }
-    places[kept++] = place;
-  }
-  places.resize(kept);
-}
-
 }  // namespace scarp

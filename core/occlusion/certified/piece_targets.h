@@ -58,7 +58,4 @@ struct PieceTargets {
 void find_targets(const FanView& view, const ExitPiece& piece, std::span<const FanEdge> crests,
                   std::span<const std::uint32_t> candidates, PieceTargets& targets);
 
-/// Leaves the upper hull of places in (u, z), by rising u. Cost: O(n log n).
-void leave_upper_hull(std::vector<FanPlace>& places);
-
 }  // namespace scarp

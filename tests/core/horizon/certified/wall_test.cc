@@ -104,7 +104,8 @@ TEST(Wall, HidesAllTargetsFromBeyondUnderItsPlanes) {
     Wall wall;
     for (std::uint32_t edge = 0; edge < ridges.edges.size(); ++edge) {
       const double slope = 4 * random.unit() - 2;
-      if (!raise_wall(ridges, scene.view, scene.beam, scene.targets, edge, slope, wall)) continue;
+      if (!raise_wall(ridges, scene.view, scene.beam, Places(scene.targets), edge, slope, wall))
+        continue;
       ++walls;
       chains += wall.planes.size() > 1;
       for (int i = 0; i < 8; ++i) {

@@ -1,0 +1,265 @@
+#include "core/occlusion/certified/reached_cells.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "core/threads/for_each_target.h"
+
+namespace scarp {
+namespace {
+
+constexpr float kNothing = -std::numeric_limits<float>::infinity();
+constexpr float kEverything = std::numeric_limits<float>::infinity();
+
+/// What the kernels read of cells.
+struct CellColumns {
+  const float *near_inverse, *far_inverse, *forward, *low_x, *low_y, *high_x, *high_y;
+};
+
+SCARP_FOR_EACH_TARGET
+void raise_cells(const CellColumns& cells, const CellPlane* planes, std::size_t plane_count,
+                 std::size_t first, std::size_t end, float* least, float* best) {
+  for (std::size_t i = first; i < end; ++i) least[i] = kEverything;
+  for (std::size_t p = 0; p < plane_count; ++p) {
+    const CellPlane plane = planes[p];
+    const float* inverse = plane.rise < 0 ? cells.near_inverse : cells.far_inverse;
+    const float* line_inverse = plane.line_rise < 0 ? cells.near_inverse : cells.far_inverse;
+    for (std::size_t i = first; i < end; ++i) {
+      const float slope = plane.rise * inverse[i];
+      const float at_low = plane.x * cells.low_x[i] + plane.y * cells.low_y[i];
+      const float at_high = plane.x * cells.high_x[i] + plane.y * cells.high_y[i];
+      const float gradient = (at_low < at_high ? at_low : at_high) - plane.slope_error;
+      const float in_cell = slope - std::abs(slope) * kSlopeRounding + gradient;
+      const float along =
+          plane.line_rise * line_inverse[i] + (plane.rising * cells.forward[i] + plane.falling);
+      const float bound = in_cell < along ? along : in_cell;
+      least[i] = bound < least[i] ? bound : least[i];
+    }
+  }
+  for (std::size_t i = first; i < end; ++i) best[i] = best[i] < least[i] ? least[i] : best[i];
+}
+
+/// Raises the bounds of rings from `first` on to the lowest of some planes along any ray.
+SCARP_FOR_EACH_TARGET
+void raise_rings(const RingTable& rings, const RingRow& forward, const CellPlane* planes,
+                 std::size_t plane_count, std::size_t first, float* least, float* best) {
+  for (std::size_t k = 0; k < kRings; ++k) least[k] = kEverything;
+  for (std::size_t p = 0; p < plane_count; ++p) {
+    const CellPlane plane = planes[p];
+    const RingRow& inverse = plane.line_rise < 0 ? rings.near_inverse : rings.far_inverse;
+    for (std::size_t k = 0; k < kRings; ++k) {
+      const float along =
+          plane.line_rise * inverse[k] + (plane.rising * forward[k] + plane.falling);
+      least[k] = along < least[k] ? along : least[k];
+    }
+  }
+  for (std::size_t k = first; k < kRings; ++k) best[k] = best[k] < least[k] ? least[k] : best[k];
+}
+
+/// Whether one of some numbers is less than another.
+SCARP_FOR_EACH_TARGET
+bool is_any_less(const float* numbers, const float* others, std::size_t count) {
+  std::int32_t any = 0;
+  for (std::size_t k = 0; k < count; ++k) any |= numbers[k] < others[k] ? 1 : 0;
+  return any != 0;
+}
+
+SCARP_FOR_EACH_TARGET
+bool is_any_raised(const float* best, const float* wanted, const float* inverse, float rise,
+                   float slope, std::size_t count) {
+  std::int32_t any = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::int32_t is_open = best[k] < wanted[k] ? 1 : 0;
+    const std::int32_t is_over = rise * inverse[k] + slope > best[k] + kSlopeTolerance ? 1 : 0;
+    any |= is_open & is_over;
+  }
+  return any != 0;
+}
+
+float slope_of_hint(std::uint16_t hint) {
+  return std::bit_cast<float>(static_cast<std::uint32_t>(hint) << 16);
+}
+
+}  // namespace
+
+std::uint16_t slope_hint(float slope) {
+  return static_cast<std::uint16_t>(std::bit_cast<std::uint32_t>(slope) >> 16);
+}
+
+RingTable::RingTable(const PolarLayout& layout, const Fan& fan) {
+  for (std::size_t k = 0; k < kRings; ++k) {
+    const auto ring = static_cast<std::int32_t>(k);
+    const double near = ring_start(layout, ring) * kFirstRing * (1 - kCellOverlap);
+    const double far = ring + 1 == kRings
+                           ? HUGE_VAL
+                           : ring_start(layout, ring + 1) * kFirstRing * (1 + kCellOverlap);
+    near_inverse[k] = static_cast<float>(1 / near * (1 + 0x1p-23));
+    far_inverse[k] = static_cast<float>(1 / far * (1 - 0x1p-23));
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const double low = -1 + 2.0 * static_cast<double>(lane) / kLanes;
+      const double high = low + 2.0 / kLanes;
+      const double offset = std::max(std::abs(low), std::abs(high));
+      const double least =
+          std::sqrt(near * near - offset * offset) * fan.cos_half - offset * fan.sin_half;
+      reach[lane][k] = least * (1 - 0x1p-40);
+      forward[lane][k] = static_cast<float>(least / near);
+      turn_low[lane][k] = std::asin(low / (low < 0 ? near : far)) - fan.half_rad - kCellOverlap;
+      turn_high[lane][k] = std::asin(high / (high > 0 ? near : far)) + fan.half_rad + kCellOverlap;
+    }
+  }
+}
+
+std::vector<SectorBorders> borders_of(const PolarLayout& layout) {
+  std::vector<SectorBorders> borders;
+  for (std::int32_t s = 0; s < layout.sectors; ++s) {
+    const double low_rad = azimuth_at(layout, s) - kCellOverlap;
+    const double high_rad = azimuth_at(layout, s + 1) + kCellOverlap;
+    borders.push_back({static_cast<float>(std::cos(low_rad)), static_cast<float>(std::sin(low_rad)),
+                       static_cast<float>(std::cos(high_rad)),
+                       static_cast<float>(std::sin(high_rad))});
+  }
+  return borders;
+}
+
+void Turns::turn_to(const PolarLayout& layout, const Fan& fan, const RingTable& rings) {
+  const std::int32_t sectors = layout.sectors;
+  const auto sector_at = [&](double azimuth_rad) {
+    return sector_of(layout, std::cos(azimuth_rad), std::sin(azimuth_rad));
+  };
+  middle = sector_at(fan.middle_rad);
+  const auto from_middle = [&](std::int32_t sector) {
+    return static_cast<std::int16_t>((sector - middle + sectors + sectors / 2) % sectors -
+                                     sectors / 2);
+  };
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    for (std::size_t k = 0; k < kRings; ++k) {
+      first[lane][k] = from_middle(sector_at(fan.middle_rad + rings.turn_low[lane][k]));
+      last[lane][k] = from_middle(sector_at(fan.middle_rad + rings.turn_high[lane][k]));
+    }
+}
+
+void ReachedCells::make_room(std::size_t size) {
+  if (cell_.size() >= size) return;
+  cell_.resize(size), turn_.resize(size);
+  for (auto* column : {&near_inverse_, &far_inverse_, &forward_, &low_x_, &low_y_, &high_x_,
+                       &high_y_, &best_, &wanted_, &least_})
+    column->resize(size);
+}
+
+void ReachedCells::reach(const RingTable& rings, const Turns& turns,
+                         std::span<const SectorBorders> borders, std::size_t low, std::size_t high,
+                         const Known& known) {
+  const auto sectors = static_cast<std::int32_t>(borders.size());
+  const auto& first_turn = turns.first[low];
+  const auto& last_turn = turns.last[high];
+  std::size_t most = 0;
+  for (std::size_t k = 0; k < kRings; ++k)
+    most += static_cast<std::size_t>(std::max(0, last_turn[k] - first_turn[k] + 1));
+  make_room(most);
+  rings_ = &rings, turns_ = &turns, low_ = low, high_ = high, sectors_ = sectors;
+  hints_ = known.least;
+  ring_best_.fill(kNothing);
+  std::uint32_t wanted = 0;
+  for (std::size_t k = 0; k < kRings; ++k) {
+    first_[k] = wanted;
+    std::int32_t sector = turns.middle + first_turn[k];
+    if (sector < 0) sector += sectors;
+    if (sector >= sectors) sector -= sectors;
+    for (std::int16_t turn = first_turn[k]; turn <= last_turn[k]; ++turn) {
+      const auto cell =
+          static_cast<std::uint32_t>(k * borders.size() + static_cast<std::size_t>(sector));
+      const float bound = known.bounds[cell];
+      if (bound > slope_of_hint(known.least[cell])) {
+        const std::size_t i = wanted++;
+        const SectorBorders& border = borders[static_cast<std::size_t>(sector)];
+        cell_[i] = cell, turn_[i] = turn;
+        near_inverse_[i] = rings.near_inverse[k], far_inverse_[i] = rings.far_inverse[k];
+        forward_[i] = forward()[k];
+        low_x_[i] = border.low_x, low_y_[i] = border.low_y;
+        high_x_[i] = border.high_x, high_y_[i] = border.high_y;
+        best_[i] = kNothing;
+        wanted_[i] = bound - kSlopeTolerance;
+      }
+      if (++sector == sectors) sector = 0;
+    }
+  }
+  first_[kRings] = wanted;
+}
+
+void ReachedCells::reach_part(const ReachedCells& whole, std::size_t low, std::size_t high) {
+  make_room(whole.size());
+  rings_ = whole.rings_, turns_ = whole.turns_, low_ = low, high_ = high;
+  sectors_ = whole.sectors_, hints_ = whole.hints_, ring_best_ = whole.ring_best_;
+  const auto& first_turn = turns_->first[low];
+  const auto& last_turn = turns_->last[high];
+  std::uint32_t size = 0;
+  for (std::size_t k = 0; k < kRings; ++k) {
+    first_[k] = size;
+    for (std::size_t i = whole.first_[k]; i < whole.first_[k + 1]; ++i) {
+      if (whole.turn_[i] < first_turn[k] || whole.turn_[i] > last_turn[k] ||
+          !(whole.best_[i] < whole.wanted_[i]))
+        continue;
+      cell_[size] = whole.cell_[i], turn_[size] = whole.turn_[i];
+      near_inverse_[size] = rings_->near_inverse[k], far_inverse_[size] = rings_->far_inverse[k];
+      forward_[size] = forward()[k];
+      low_x_[size] = whole.low_x_[i], low_y_[size] = whole.low_y_[i];
+      high_x_[size] = whole.high_x_[i], high_y_[size] = whole.high_y_[i];
+      best_[size] = whole.best_[i], wanted_[size] = whole.wanted_[i];
+      ++size;
+    }
+  }
+  first_[kRings] = size;
+}
+
+void ReachedCells::raise(std::span<const CellPlane> planes, std::size_t first) {
+  if (first >= kRings) return;
+  raise_cells({near_inverse_.data(), far_inverse_.data(), forward_.data(), low_x_.data(),
+               low_y_.data(), high_x_.data(), high_y_.data()},
+              planes.data(), planes.size(), first_[first], size(), least_.data(), best_.data());
+  raise_rings(*rings_, forward(), planes.data(), planes.size(), first, ring_least_.data(),
+              ring_best_.data());
+}
+
+bool ReachedCells::is_open(std::size_t first, std::size_t end) const {
+  return is_any_less(best_.data() + first_[first], wanted_.data() + first_[first],
+                     first_[end] - first_[first]);
+}
+
+std::size_t ReachedCells::end_of_open() const {
+  std::size_t i = size();
+  while (i > 0 && !(best_[i - 1] < wanted_[i - 1])) --i;
+  return static_cast<std::size_t>(std::lower_bound(first_.begin(), first_.end(), i) -
+                                  first_.begin());
+}
+
+bool ReachedCells::is_promising(float rise, float slope, std::size_t first, std::size_t end) const {
+  const std::size_t begin = first_[first];
+  const float* inverse = (rise < 0 ? far_inverse_ : near_inverse_).data() + begin;
+  return is_any_raised(best_.data() + begin, wanted_.data() + begin, inverse, rise, slope,
+                       first_[end] - begin);
+}
+
+void ReachedCells::lower(float* bounds) const {
+  for (std::size_t i = 0; i < size(); ++i) bounds[cell_[i]] = std::min(bounds[cell_[i]], best_[i]);
+  for (std::size_t k = 0; k < kRings; ++k) {
+    float* ring = bounds + k * static_cast<std::size_t>(sectors_);
+    const std::uint16_t* hints = hints_ + k * static_cast<std::size_t>(sectors_);
+    std::int32_t sector = turns_->middle + turns_->first[low_][k];
+    if (sector < 0) sector += sectors_;
+    if (sector >= sectors_) sector -= sectors_;
+    for (int turn = turns_->first[low_][k]; turn <= turns_->last[high_][k]; ++turn) {
+      if (!(ring[sector] > slope_of_hint(hints[sector])))
+        ring[sector] = std::min(ring[sector], ring_best_[k]);
+      if (++sector == sectors_) sector = 0;
+    }
+  }
+}
+
+void ReachedCells::lower_closed(float* bounds) const {
+  for (std::size_t i = 0; i < size(); ++i)
+    if (best_[i] >= wanted_[i]) bounds[cell_[i]] = std::min(bounds[cell_[i]], best_[i]);
+}
+
+}  // namespace scarp
