@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -71,6 +72,8 @@ std::optional<std::string> check_files(const SceneDescription& scene) {
   for (const SceneTile& tile : scene.tiles) {
     if (!is_tile_id(tile.id)) return fmt::format("tile id \"{}\" is not level/column/row", tile.id);
     if (!ids.insert(tile.id).second) return fmt::format("tile \"{}\" is listed twice", tile.id);
+    if (tile.contents && !(all_finite(tile.contents->low) && all_finite(tile.contents->high)))
+      return fmt::format("the bounds of tile \"{}\" are not finite", tile.id);
     for (const StoredFile& file : tile.files) {
       if (auto wrong = check_file(file, names)) return wrong;
     }
@@ -94,6 +97,17 @@ Json to_json(const std::vector<StoredFile>& files) {
   Json list = Json::array();
   for (const StoredFile& file : files) list.push_back(to_json(file));
   return list;
+}
+
+Json to_json(const SceneTile& tile) {
+  Json json = {{"id", tile.id}, {"files", to_json(tile.files)}};
+  if (tile.contents)
+    json["contents"] = {{"low", tile.contents->low},
+                        {"high", tile.contents->high},
+                        {"vertices", tile.contents->vertices},
+                        {"triangles", tile.contents->triangles},
+                        {"groups", tile.contents->groups}};
+  return json;
 }
 
 Json to_json(const EarthModel& earth) {
@@ -186,8 +200,20 @@ SourceFile source_from(const Place& place) {
   return {place.at("name").text(), place.at("size").size(), place.at("xxh128").checksum()};
 }
 
+TileContents contents_from(const Place& place) {
+  TileContents contents;
+  contents.low = place.at("low").numbers<3>();
+  contents.high = place.at("high").numbers<3>();
+  contents.vertices = place.at("vertices").size();
+  contents.triangles = place.at("triangles").size();
+  contents.groups = place.at("groups").size();
+  return contents;
+}
+
 SceneTile tile_from(const Place& place) {
-  return {place.at("id").text(), place.at("files").list(stored_file_from)};
+  SceneTile tile{place.at("id").text(), place.at("files").list(stored_file_from), {}};
+  if (place.value.contains("contents")) tile.contents = contents_from(place.at("contents"));
+  return tile;
 }
 
 EarthModel earth_from(const Place& place) {
@@ -239,6 +265,29 @@ bool checksum_fits(std::string_view text) {
 
 }  // namespace
 
+TilePlace tile_place(const std::string& id) {
+  assert(is_tile_id(id));
+  TilePlace place;
+  const char* const end = id.data() + id.size();
+  const char* at = std::from_chars(id.data(), end, place.level).ptr;
+  at = std::from_chars(at + 1, end, place.column).ptr;
+  std::from_chars(at + 1, end, place.row);
+  return place;
+}
+
+std::vector<std::size_t> finest_tiles(const SceneDescription& scene) {
+  std::int32_t finest = 0;
+  for (const SceneTile& tile : scene.tiles) finest = std::max(finest, tile_place(tile.id).level);
+  std::vector<std::size_t> tiles;
+  for (std::size_t i = 0; i < scene.tiles.size(); ++i)
+    if (tile_place(scene.tiles[i].id).level == finest) tiles.push_back(i);
+  std::ranges::sort(tiles, {}, [&](std::size_t i) {
+    const TilePlace place = tile_place(scene.tiles[i].id);
+    return std::pair(place.row, place.column);
+  });
+  return tiles;
+}
+
 std::optional<std::string> check_description(const SceneDescription& scene) {
   if (!(scene.earth.refraction >= 0 && scene.earth.refraction <= 1))
     return fmt::format("refraction {} is not in 0 to 1", scene.earth.refraction);
@@ -261,8 +310,7 @@ std::string scene_to_json(const SceneDescription& scene) {
     sources.push_back(
         {{"name", source.name}, {"size", source.size}, {"xxh128", to_hex(source.checksum)}});
   Json tiles = Json::array();
-  for (const SceneTile& tile : scene.tiles)
-    tiles.push_back({{"id", tile.id}, {"files", to_json(tile.files)}});
+  for (const SceneTile& tile : scene.tiles) tiles.push_back(to_json(tile));
   const Json json = {{"format", "scarp scene"},
                      {"version", kSceneVersion},
                      {"made_by", scene.made_by},

@@ -62,12 +62,33 @@ struct StoredFile {
   friend bool operator==(const StoredFile&, const StoredFile&) = default;
 };
 
+/// What a tile holds, so that readers open only those that they need.
+struct TileContents {
+  std::array<double, 3> low{}, high{};  ///< bounds of the vertices, flattened, metres
+  std::uint64_t vertices = 0;
+  std::uint64_t triangles = 0;
+  std::uint64_t groups = 0;  ///< leaves; 0 where the tile has none
+
+  friend bool operator==(const TileContents&, const TileContents&) = default;
+};
+
 struct SceneTile {
   std::string id;  ///< "level/column/row", such as "0/0/0"
   std::vector<StoredFile> files;
+  std::optional<TileContents> contents = {};  ///< none in scenes of an earlier version
 
   friend bool operator==(const SceneTile&, const SceneTile&) = default;
 };
+
+/// Where a tile is: level 0 is the root, columns and rows count tiles of the level.
+struct TilePlace {
+  std::int32_t level = 0, column = 0, row = 0;
+
+  friend auto operator<=>(const TilePlace&, const TilePlace&) = default;
+};
+
+/// Requires a proper id (asserted).
+TilePlace tile_place(const std::string& id);
 
 using ParameterValue = std::variant<bool, std::int64_t, double, std::string>;
 
@@ -83,6 +104,10 @@ struct SceneDescription {
 
   friend bool operator==(const SceneDescription&, const SceneDescription&) = default;
 };
+
+/// Tiles of the finest level that has any, which cover the scene: by rising row, then column.
+/// Groups of a scene are counted on from one to the next in this order. Indices into scene.tiles.
+std::vector<std::size_t> finest_tiles(const SceneDescription& scene);
 
 /// Names what is wrong with a description, or nothing: numbers finite and in range, tile ids and
 /// file names proper and unique. A proper file name is relative and never leaves the folder.
