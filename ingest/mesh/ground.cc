@@ -112,7 +112,7 @@ TileBorder tile_border(const SampleGrid& grid, const GroundCells& ground, const 
   TileBorder border;
   const EdgeSimplifier simplifier(grid, max_error_m, bound);
   const auto append = [&](int side, const BorderRun& run) {
-    if (side < kShared)
+    if (side <= kShared)
       append_split(grid, run, border.runs);
     else
       simplifier.append(run, border);
