@@ -21,6 +21,7 @@
 #include "ingest/mesh/cell_walk.h"
 #include "ingest/mesh/ground.h"
 #include "ingest/mesh/plane_traits.h"
+#include "ingest/mesh/tile_mesh.h"
 
 namespace scarp {
 namespace {
@@ -129,7 +130,8 @@ bool is_exactly_affine(const SampleGrid& grid, const GroundCells& ground) {
 
 class GreedyMesher {
  public:
-  GreedyMesher(const SampleGrid& grid, const MeshOptions& options, const Progress& progress);
+  GreedyMesher(const SampleGrid& grid, const SampleRange& range, const MeshOptions& options,
+               const Progress& progress);
   Mesh run();
 
  private:
@@ -195,6 +197,7 @@ class GreedyMesher {
   double cell_ambiguity_m() const;
 
   const SampleGrid& grid_;
+  const SampleRange range_;
   const MeshOptions& options_;
   const Progress& progress_;
   GroundCells ground_;
@@ -211,12 +214,13 @@ class GreedyMesher {
   double told_ = 0;  // progress must not fall
 };
 
-GreedyMesher::GreedyMesher(const SampleGrid& grid, const MeshOptions& options,
-                           const Progress& progress)
+GreedyMesher::GreedyMesher(const SampleGrid& grid, const SampleRange& range,
+                           const MeshOptions& options, const Progress& progress)
     : grid_(grid),
+      range_(range),
       options_(options),
       progress_(progress),
-      ground_(grid),
+      ground_(grid, range),
       plane_(sample_plane_of(grid)),
       affine_(is_exactly_affine(grid, ground_)),
       // A sample moves by at most half a step in x and in y, and so does the chord's end.
@@ -234,7 +238,9 @@ bool GreedyMesher::is_ground(Face f) const {
 /// Puts the border of the ground in as constraints. This is the place for further constraints,
 /// such as building outlines: they would be inserted here, with heights of their own.
 void GreedyMesher::insert_border() {
-  const std::vector<BorderRun> runs = ground_border(grid_, ground_);
+  const TileBorder border =
+      tile_border(grid_, ground_, range_, options_.max_error_m.value_or(0), options_.bound);
+  const std::vector<BorderRun>& runs = border.runs;
   std::vector<Point> ends;
   for (const BorderRun& run : runs) {
     for (const GridNode& n : {run.from, run.to}) {
@@ -448,10 +454,11 @@ Candidate GreedyMesher::worst_sample(const std::array<GridNode, 3>& n, Face f) c
   // distance from a whole number lets samples on the edge in and no other.
   constexpr double kOnEdge = 0x1p-21;
   Candidate worst;
-  const std::int32_t first = std::max(top - beyond, 0);
-  const std::int32_t last = std::min(bottom + beyond, grid_.rows - 1);
+  const std::int32_t first = std::max(top - beyond, range_.first.row);
+  const std::int32_t last = std::min(bottom + beyond, range_.last.row);
   for (std::int32_t r = first; r <= last; ++r) {
-    double low = 0, high = grid_.columns - 1, inner_low = low, inner_high = high;
+    double low = range_.first.column, high = range_.last.column;
+    double inner_low = low, inner_high = high;
     for (const EdgeColumns& e : edges) {
       const double at = e.at_row0 + (r - top) * e.per_row;
       if (e.bounds > 0) {
@@ -706,18 +713,13 @@ Mesh GreedyMesher::result() {
   }
   mesh.error_over_surface_m = std::max(mesh.error_over_surface_m, mesh.error_at_samples_m);
   mesh.cell_ambiguity_m = cell_ambiguity_m();
-  mesh.lost_samples = count_lost_samples(grid_, ground_);
+  mesh.lost_samples = count_lost_samples(grid_, range_);
   copy_triangles(mesh);
   return mesh;
 }
 
 Mesh GreedyMesher::run() {
-  if (ground_.count() == 0)
-    throw Error(
-        ErrorCode::kInput,
-        "mesh: no cell of the " + std::to_string(grid_.columns) + " x " +
-            std::to_string(grid_.rows) +
-            " samples has four known corners; at least one is wanted; check the nodata value");
+  if (ground_.count() == 0) return {};
   insert_border();
   goal_m_ = std::max(options_.max_error_m.value_or(0.0), kErrorRoundingM / 2);
   const std::uint32_t budget = options_.vertex_budget.value_or(kNone);
@@ -732,14 +734,42 @@ Mesh GreedyMesher::run() {
   return mesh;
 }
 
-}  // namespace
-
-Mesh mesh_samples(const SampleGrid& grid, const MeshOptions& options, const Progress& progress) {
+void check_options(const SampleGrid& grid, const MeshOptions& options) {
   assert(options.max_error_m.has_value() != options.vertex_budget.has_value());
   assert(!options.max_error_m || *options.max_error_m >= 0);
   assert(grid.columns <= kMeshReachCells && grid.rows <= kMeshReachCells);
   assert(grid.positions.size() <= kTargetMask);
-  return GreedyMesher(grid, options, progress).run();
+}
+
+}  // namespace
+
+Mesh mesh_samples(const SampleGrid& grid, const MeshOptions& options, const Progress& progress) {
+  check_options(grid, options);
+  Mesh mesh = GreedyMesher(grid, all_samples(grid), options, progress).run();
+  if (mesh.tin.triangles.empty())
+    throw Error(
+        ErrorCode::kInput,
+        "mesh: no cell of the " + std::to_string(grid.columns) + " x " + std::to_string(grid.rows) +
+            " samples has four known corners; at least one is wanted; check the nodata value");
+  return mesh;
+}
+
+Mesh mesh_tile(const TileScheme& scheme, const TileId& tile, const SampleGrid& window,
+               const MeshOptions& options, const Progress& progress) {
+  check_options(window, options);
+  assert(options.max_error_m.has_value());
+  const SampleWindow own = scheme.window(tile), with_halo = scheme.window_with_halo(tile);
+  assert(window.columns == with_halo.columns && window.rows == with_halo.rows);
+  const GridNode first{(own.first_column - with_halo.first_column) / own.stride,
+                       (own.first_row - with_halo.first_row) / own.stride};
+  const SampleRange range{first, {first.column + own.columns - 1, first.row + own.rows - 1}};
+  Mesh mesh = GreedyMesher(window, range, options, progress).run();
+  for (std::int64_t& sample : mesh.sample_of_vertex) {
+    const std::int64_t column = sample % window.columns, row = sample / window.columns;
+    sample = (with_halo.first_row + row * own.stride) * scheme.columns() +
+             (with_halo.first_column + column * own.stride);
+  }
+  return mesh;
 }
 
 }  // namespace scarp

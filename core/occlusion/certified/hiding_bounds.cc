@@ -144,7 +144,7 @@ std::vector<std::int32_t> scattered_order(std::int32_t count) {
 class Bounding {
  public:
   Bounding(const Tin& tin, std::span<const GroupIndex> group_of_triangle, std::uint32_t groups,
-           const HidingOptions& options)
+           const HidingOptions& options, const std::optional<Scenery>& scenery)
       : tin_(tin),
         options_(options),
         edges_(edges_of_groups(tin, group_of_triangle, groups)),
@@ -155,17 +155,19 @@ class Bounding {
     const double depth_m = bounds.high.y_m - bounds.low.y_m;
     origin_x_m_ = round_to_lattice(bounds.low.x_m + width_m / 2);
     origin_y_m_ = round_to_lattice(bounds.low.y_m + depth_m / 2);
+    const std::size_t own = scenery ? scenery->own_triangles : tin.triangles.size();
     double area_m2 = 0, radius_m = 0;
-    for (const auto& [a, b, c] : tin.triangles) {
+    for (const auto& [a, b, c] : std::span(tin.triangles).first(own)) {
       const Position &p = tin.vertices[a], &q = tin.vertices[b], &r = tin.vertices[c];
       area_m2 += ((q.x_m - p.x_m) * (r.y_m - p.y_m) - (q.y_m - p.y_m) * (r.x_m - p.x_m)) / 2;
     }
     for (const Circle& circle : bounds_.circle) radius_m += circle.radius_m / groups;
-    unit_m_ = std::sqrt(2 * area_m2 / static_cast<double>(tin.triangles.size()));
-    lowest_m_ = bounds.low.z_m;
-    // The finer rings where they reach over the whole surface.
+    unit_m_ = std::sqrt(2 * area_m2 / static_cast<double>(own));
+    lowest_m_ = scenery ? scenery->lowest_m : bounds.low.z_m;
+    // The finer rings where they reach over the whole surface; the same for all tiles of a scene.
     const double reach = std::hypot(width_m, depth_m) / radius_m;
-    bounds_.layout = {options.sectors, reach < ring_start({8, 3}, kRings - 1) ? 3 : 2};
+    const bool is_all = own == tin.triangles.size();
+    bounds_.layout = {options.sectors, is_all && reach < ring_start({8, 3}, kRings - 1) ? 3 : 2};
     // No sector is as much as a tenth wider than equal ones would be.
     sagitta_ = static_cast<float>(1 - std::cos(1.1 * std::numbers::pi / options.sectors));
     bounds_.slope.assign(
@@ -548,10 +550,10 @@ class Bounding {
 
 HidingBounds bound_hiding(const Tin& tin, std::span<const GroupIndex> group_of_triangle,
                           std::uint32_t groups, const HidingOptions& options,
-                          const Progress& progress) {
+                          const Progress& progress, const std::optional<Scenery>& scenery) {
   assert(group_of_triangle.size() == tin.triangles.size());
   if (groups == 0) return {};
-  return Bounding(tin, group_of_triangle, groups, options).run(progress);
+  return Bounding(tin, group_of_triangle, groups, options, scenery).run(progress);
 }
 
 }  // namespace scarp

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -38,6 +40,12 @@ struct HidingBounds {
   }
 };
 
+/// What is known of a scene when groups of one of its tiles are bounded.
+struct Scenery {
+  std::size_t own_triangles = 0;  ///< these come first; the others have no group and only hide
+  double lowest_m = 0;            ///< no camera over the data is lower
+};
+
 /// Bounds all groups. For each fan of directions and each piece of a group's border over which rays
 /// of the fan leave the group, planes are found that have all ground of the group behind the piece
 /// under them: through the border itself, and through chains of ridges further out that every such
@@ -51,8 +59,13 @@ struct HidingBounds {
 /// Cost: about fans * 3 us a triangle, and 256 bytes for each group and sector.
 /// Source: own; supporting planes as in Law and Tan 1999, for one ridge and all of a group's
 /// ground.
+/// @param scenery  of a tile in a scene. Then triangles beyond own_triangles may be pieces that
+///                 overlap or do not touch, as long as they lie nowhere above true ground: an edge
+///                 is only ever asked to hide what its own plane hides. Without it all triangles
+///                 are the tile's own and their lowest vertex is lowest_m.
 HidingBounds bound_hiding(const Tin& tin, std::span<const GroupIndex> group_of_triangle,
                           std::uint32_t groups, const HidingOptions& options,
-                          const Progress& progress = {});
+                          const Progress& progress = {},
+                          const std::optional<Scenery>& scenery = {});
 
 }  // namespace scarp
