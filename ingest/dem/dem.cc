@@ -121,7 +121,7 @@ Ground read_ground(const std::vector<std::string>& files, const DemOptions& opti
 }
 
 SampleGrid place_samples(const Dem& dem) {
-  return place_window(dem, {0, 0, dem.columns, dem.rows}, 1, dem.heights_m, dem.known);
+  return place_window(dem, {0, 0, dem.columns, dem.rows}, dem.heights_m, dem.known);
 }
 
 }  // namespace scarp

@@ -20,44 +20,6 @@ double plane_distance_m(const Position& a, const Position& b) {
   return std::hypot(a.x_m - b.x_m, a.y_m - b.y_m);
 }
 
-/// Nominal cell size at the centre, and how far grid lines bend. Second differences are taken over
-/// an eighth of the raster at height 0, where the lattice is negligible, and divided by the square
-/// of that length; the map is smooth, so half as much again bounds what lies between.
-void measure_cells(const Dem& dem, SampleGrid& grid) {
-  const GeoFrame::Placer placer(*dem.frame);
-  const auto at = [&](double column, double row) {
-    return placer.place({dem.x_of(column), dem.y_of(row), 0});
-  };
-  const double middle_column = (dem.columns - 1) / 2.0, middle_row = (dem.rows - 1) / 2.0;
-  const double reach_x = std::max(1.0, (dem.columns - 1) / 8.0),
-               reach_y = std::max(1.0, (dem.rows - 1) / 8.0);
-  grid.cell_x_m =
-      plane_distance_m(at(middle_column - 1, middle_row), at(middle_column + 1, middle_row)) / 2;
-  grid.cell_y_m =
-      plane_distance_m(at(middle_column, middle_row - 1), at(middle_column, middle_row + 1)) / 2;
-  if (dem.frame->description().earth == Earth::kFlat) return;
-  constexpr int kStations = 7;
-  constexpr double kBetweenStations = 1.5;
-  const double cell_m = std::min(grid.cell_x_m, grid.cell_y_m);
-  const auto bend = [&](double column, double row, double dx, double dy) {
-    const Position a = at(column - dx, row - dy), b = at(column, row),
-                   c = at(column + dx, row + dy);
-    const Position middle{(a.x_m + c.x_m) / 2, (a.y_m + c.y_m) / 2, 0};
-    // 4: half of a chord of two steps, so the sagitta over one step is a quarter
-    return plane_distance_m(middle, b) / cell_m / (4 * std::max(dx * dx, dy * dy));
-  };
-  for (int i = 0; i < kStations; ++i) {
-    for (int j = 0; j < kStations; ++j) {
-      const double column = reach_x + (dem.columns - 1 - 2 * reach_x) * i / (kStations - 1);
-      const double row = reach_y + (dem.rows - 1 - 2 * reach_y) * j / (kStations - 1);
-      const double most =
-          std::max({bend(column, row, reach_x, 0), bend(column, row, 0, reach_y),
-                    bend(column, row, reach_x, reach_y), bend(column, row, reach_x, -reach_y)});
-      grid.bend_cells = std::max(grid.bend_cells, kBetweenStations * most);
-    }
-  }
-}
-
 }  // namespace
 
 DemWindows::DemWindows(const std::vector<std::string>& files, const DemOptions& options)
@@ -98,6 +60,12 @@ DemSource DemWindows::read_file(std::size_t index, const Progress& progress, con
   const XXH128_hash_t digest = XXH3_128bits_digest(hash.get());
   described.checksum = fmt::format("{:016x}{:016x}", digest.high64, digest.low64);
   return described;
+}
+
+std::int32_t DemWindows::widest_columns() const {
+  std::int32_t widest = 0;
+  for (const RasterFile& file : files_) widest = std::max(widest, file.columns);
+  return widest;
 }
 
 template <class Put>
@@ -184,12 +152,52 @@ HeightWindow DemWindows::read(const SampleRect& rect) const {
   return window;
 }
 
-SampleGrid place_window(const Dem& dem, const HeightWindow& window) {
-  return place_window(dem, window.rect, window.stride, window.heights_m, window.known);
+/// Nominal cell size at the centre, and how far grid lines bend. Second differences are taken over
+/// an eighth of the raster at height 0, where the lattice is negligible, and divided by the square
+/// of that length; the map is smooth, so half as much again bounds what lies between.
+CellMeasures measure_cells(const Dem& dem) {
+  CellMeasures cells;
+  const GeoFrame::Placer placer(*dem.frame);
+  const auto at = [&](double column, double row) {
+    return placer.place({dem.x_of(column), dem.y_of(row), 0});
+  };
+  const double middle_column = (dem.columns - 1) / 2.0, middle_row = (dem.rows - 1) / 2.0;
+  const double reach_x = std::max(1.0, (dem.columns - 1) / 8.0),
+               reach_y = std::max(1.0, (dem.rows - 1) / 8.0);
+  cells.cell_x_m =
+      plane_distance_m(at(middle_column - 1, middle_row), at(middle_column + 1, middle_row)) / 2;
+  cells.cell_y_m =
+      plane_distance_m(at(middle_column, middle_row - 1), at(middle_column, middle_row + 1)) / 2;
+  if (dem.frame->description().earth == Earth::kFlat) return cells;
+  constexpr int kStations = 7;
+  constexpr double kBetweenStations = 1.5;
+  const double cell_m = std::min(cells.cell_x_m, cells.cell_y_m);
+  const auto bend = [&](double column, double row, double dx, double dy) {
+    const Position a = at(column - dx, row - dy), b = at(column, row),
+                   c = at(column + dx, row + dy);
+    const Position middle{(a.x_m + c.x_m) / 2, (a.y_m + c.y_m) / 2, 0};
+    // 4: half of a chord of two steps, so the sagitta over one step is a quarter
+    return plane_distance_m(middle, b) / cell_m / (4 * std::max(dx * dx, dy * dy));
+  };
+  for (int i = 0; i < kStations; ++i) {
+    for (int j = 0; j < kStations; ++j) {
+      const double column = reach_x + (dem.columns - 1 - 2 * reach_x) * i / (kStations - 1);
+      const double row = reach_y + (dem.rows - 1 - 2 * reach_y) * j / (kStations - 1);
+      const double most =
+          std::max({bend(column, row, reach_x, 0), bend(column, row, 0, reach_y),
+                    bend(column, row, reach_x, reach_y), bend(column, row, reach_x, -reach_y)});
+      cells.bend_cells = std::max(cells.bend_cells, kBetweenStations * most);
+    }
+  }
+  return cells;
 }
 
-SampleGrid place_window(const Dem& dem, const SampleRect& rect, std::int32_t stride,
-                        std::span<const double> heights_m, std::span<const std::uint8_t> known) {
+SampleGrid place_window(const Dem& dem, const HeightWindow& window) {
+  return place_window(dem, window.rect, window.heights_m, window.known);
+}
+
+SampleGrid place_window(const Dem& dem, const SampleRect& rect, std::span<const double> heights_m,
+                        std::span<const std::uint8_t> known) {
   SampleGrid grid;
   grid.columns = rect.columns;
   grid.rows = rect.rows;
@@ -205,18 +213,17 @@ SampleGrid place_window(const Dem& dem, const SampleRect& rect, std::int32_t str
     const std::size_t end =
         std::min((block + 1) * kRowsPerBlock, static_cast<std::size_t>(grid.rows));
     for (std::size_t row = block * kRowsPerBlock; row < end; ++row) {
-      const double y = dem.y_of(rect.first_row + static_cast<double>(row) * stride);
+      const double y = dem.y_of(rect.first_row + static_cast<double>(row));
       for (std::size_t c = 0; c < columns; ++c)
-        points[c] = {dem.x_of(rect.first_column + static_cast<double>(c) * stride), y,
+        points[c] = {dem.x_of(rect.first_column + static_cast<double>(c)), y,
                      heights_m[row * columns + c]};
       placer.place(points, std::span(grid.positions).subspan(row * columns, columns));
     }
   });
-  measure_cells(dem, grid);
-  // A step of n cells bends n^2 times as far, which is n times as much of its length.
-  grid.cell_x_m *= stride;
-  grid.cell_y_m *= stride;
-  grid.bend_cells *= stride;
+  const CellMeasures cells = measure_cells(dem);
+  grid.cell_x_m = cells.cell_x_m;
+  grid.cell_y_m = cells.cell_y_m;
+  grid.bend_cells = cells.bend_cells;
   return grid;
 }
 

@@ -13,10 +13,9 @@
 
 namespace scarp {
 
-/// Heights of a part of a raster: of every `stride`-th sample, from the rectangle's first one on.
+/// Heights of a part of a raster.
 struct HeightWindow {
-  SampleRect rect;                  ///< columns and rows are those of the window
-  std::int32_t stride = 1;          ///< samples of the raster from one of the window's to the next
+  SampleRect rect;
   std::vector<double> heights_m;    ///< [rows * columns]; 0 where void
   std::vector<std::uint8_t> known;  ///< [rows * columns]
 };
@@ -35,6 +34,9 @@ class DemWindows {
 
   /// Without heights_m and known, its sources without samples and checksums.
   const Dem& dem() const { return dem_; }
+
+  /// Columns of the widest file.
+  std::int32_t widest_columns() const;
 
   /// Reads every height once, file by file, and refuses what read_dem refuses.
   /// @return the sources, with how many samples they know and the checksums of their values
@@ -63,14 +65,21 @@ class DemWindows {
   std::vector<HeightReader> readers_;
 };
 
+/// The cells of a raster, whatever its heights: as SampleGrid has them.
+struct CellMeasures {
+  double cell_x_m = 0, cell_y_m = 0;
+  double bend_cells = 0;
+};
+CellMeasures measure_cells(const Dem& dem);
+
 /// Places the samples of a window of a DEM in the DEM's frame: each as place_samples does, which is
-/// this for the whole raster. Cells and their bending are those of the window's stride.
+/// this for the whole raster. Cells and their bending are those of the DEM.
 /// @param dem  may be without heights
 SampleGrid place_window(const Dem& dem, const HeightWindow& window);
 
 /// The same of borrowed heights. [rows * columns] each, of the rectangle
-SampleGrid place_window(const Dem& dem, const SampleRect& rect, std::int32_t stride,
-                        std::span<const double> heights_m, std::span<const std::uint8_t> known);
+SampleGrid place_window(const Dem& dem, const SampleRect& rect, std::span<const double> heights_m,
+                        std::span<const std::uint8_t> known);
 
 /// Bounds what GDAL keeps of files that were read, for all of the process. More than a row of a
 /// file's blocks should fit, or they are unpacked again and again.

@@ -86,7 +86,7 @@ class SceneWriter {
   /// Size and checksum of a file that lies there, for the description. Reads it once.
   StoredFile record(const std::string& name, const std::string& kind) const;
 
-  void keep_unfinished() { keep_ = true; }
+  void keep_unfinished(bool keep = true) { keep_ = keep; }
 
   /// The last call. Requires check_description to find nothing (else Error{kUsage}), every
   /// listed file to be there with its size (else Error{kCorrupt}), and that nobody shares the

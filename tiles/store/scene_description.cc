@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cassert>
-#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -36,22 +35,6 @@ bool is_proper_name(const std::string& name) {
   });
 }
 
-bool is_tile_id(const std::string& id) {
-  int parts = 1;
-  std::size_t digits = 0;
-  for (const char c : id) {
-    if (c == '/' && digits > 0) {
-      ++parts;
-      digits = 0;
-    } else if (c >= '0' && c <= '9' && digits < 9) {
-      ++digits;
-    } else {
-      return false;
-    }
-  }
-  return parts == 3 && digits > 0;
-}
-
 template <class Numbers>
 bool all_finite(const Numbers& numbers) {
   return std::ranges::all_of(numbers, [](double x) { return std::isfinite(x); });
@@ -70,7 +53,7 @@ std::optional<std::string> check_file(const StoredFile& file, std::set<std::stri
 std::optional<std::string> check_files(const SceneDescription& scene) {
   std::set<std::string> names, ids;
   for (const SceneTile& tile : scene.tiles) {
-    if (!is_tile_id(tile.id)) return fmt::format("tile id \"{}\" is not level/column/row", tile.id);
+    if (!tile_named(tile.id)) return fmt::format("tile id \"{}\" is not level/column/row", tile.id);
     if (!ids.insert(tile.id).second) return fmt::format("tile \"{}\" is listed twice", tile.id);
     if (tile.contents && !(all_finite(tile.contents->low) && all_finite(tile.contents->high)))
       return fmt::format("the bounds of tile \"{}\" are not finite", tile.id);
@@ -265,26 +248,19 @@ bool checksum_fits(std::string_view text) {
 
 }  // namespace
 
-TilePlace tile_place(const std::string& id) {
-  assert(is_tile_id(id));
-  TilePlace place;
-  const char* const end = id.data() + id.size();
-  const char* at = std::from_chars(id.data(), end, place.level).ptr;
-  at = std::from_chars(at + 1, end, place.column).ptr;
-  std::from_chars(at + 1, end, place.row);
-  return place;
+TileId tile_id(const SceneTile& tile) {
+  const std::optional<TileId> id = tile_named(tile.id);
+  assert(id);
+  return *id;
 }
 
 std::vector<std::size_t> finest_tiles(const SceneDescription& scene) {
   std::int32_t finest = 0;
-  for (const SceneTile& tile : scene.tiles) finest = std::max(finest, tile_place(tile.id).level);
+  for (const SceneTile& tile : scene.tiles) finest = std::max(finest, tile_id(tile).level);
   std::vector<std::size_t> tiles;
   for (std::size_t i = 0; i < scene.tiles.size(); ++i)
-    if (tile_place(scene.tiles[i].id).level == finest) tiles.push_back(i);
-  std::ranges::sort(tiles, {}, [&](std::size_t i) {
-    const TilePlace place = tile_place(scene.tiles[i].id);
-    return std::pair(place.row, place.column);
-  });
+    if (tile_id(scene.tiles[i]).level == finest) tiles.push_back(i);
+  std::ranges::sort(tiles, {}, [&](std::size_t i) { return tile_id(scene.tiles[i]); });
   return tiles;
 }
 

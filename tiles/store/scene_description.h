@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/terrain/tile_scheme.h"
 #include "tiles/store/checksum.h"
 
 /// What scene.json says, as plain data. docs/formats.md has the file's members.
@@ -80,16 +81,6 @@ struct SceneTile {
   friend bool operator==(const SceneTile&, const SceneTile&) = default;
 };
 
-/// Where a tile is: level 0 is the root, columns and rows count tiles of the level.
-struct TilePlace {
-  std::int32_t level = 0, column = 0, row = 0;
-
-  friend auto operator<=>(const TilePlace&, const TilePlace&) = default;
-};
-
-/// Requires a proper id (asserted).
-TilePlace tile_place(const std::string& id);
-
 using ParameterValue = std::variant<bool, std::int64_t, double, std::string>;
 
 struct SceneDescription {
@@ -104,6 +95,9 @@ struct SceneDescription {
 
   friend bool operator==(const SceneDescription&, const SceneDescription&) = default;
 };
+
+/// The place of a tile. Requires a proper id (asserted).
+TileId tile_id(const SceneTile& tile);
 
 /// Tiles of the finest level that has any, which cover the scene: by rising row, then column.
 /// Groups of a scene are counted on from one to the next in this order. Indices into scene.tiles.

@@ -105,28 +105,6 @@ TEST(DemWindows, CheckTellsWhatReadingTells) {
   }
 }
 
-TEST(DemWindows, EveryOtherSampleIsPlacedLikeTheSampleItself) {
-  const TempFolder folder;
-  const std::vector<std::string> files = {
-      write_piece(folder.path("a.tif"), {0, 0, kColumns, kRows}, false)};
-  const DemWindows source(files, {});
-  const SampleGrid all = place_window(source.dem(), source.read({0, 0, kColumns, kRows}));
-  HeightWindow sparse;
-  sparse.rect = {3, 5, 6, 4};
-  sparse.stride = 8;
-  for (std::int32_t r = 0; r < 4; ++r) {
-    for (std::int32_t c = 0; c < 6; ++c) {
-      const HeightWindow one = source.read({3 + 8 * c, 5 + 8 * r, 1, 1});
-      sparse.heights_m.push_back(one.heights_m[0]);
-      sparse.known.push_back(one.known[0]);
-    }
-  }
-  const SampleGrid grid = place_window(source.dem(), sparse);
-  for (std::int32_t r = 0; r < 4; ++r)
-    for (std::int32_t c = 0; c < 6; ++c) EXPECT_EQ(grid.at(c, r), all.at(3 + 8 * c, 5 + 8 * r));
-  EXPECT_EQ(grid.cell_x_m, 8 * all.cell_x_m);
-}
-
 TEST(DemWindows, AFileThatShrankMeanwhileIsNamed) {
   const TempFolder folder;
   const std::string path = write_piece(folder.path("a.tif"), {0, 0, kColumns, kRows}, false);

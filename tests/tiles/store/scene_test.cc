@@ -74,7 +74,6 @@ TEST(SceneDescription, FinestTilesGoByRowThenColumn) {
   for (const char* id : {"2/10/0", "0/0/0", "2/0/1", "1/0/0", "2/2/0", "2/1/1"})
     scene.tiles.push_back({id, {}, {}});
   EXPECT_EQ(finest_tiles(scene), (std::vector<std::size_t>{4, 0, 2, 5}));
-  EXPECT_EQ(tile_place("2/10/0"), (TilePlace{2, 10, 0}));
 }
 
 TEST(SceneDescription, EveryTruncationAndEveryFlippedByteIsAnError) {

@@ -1,0 +1,133 @@
+#include <algorithm>
+
+#include "cli/build/step_run.h"
+#include "core/terrain/occluder.h"
+#include "core/terrain/range_pyramid.h"
+#include "core/terrain/weld.h"
+#include "ingest/mesh/tile_mesh.h"
+#include "tiles/store/range_file.h"
+#include "tiles/store/samples_file.h"
+#include "tiles/store/tin_file.h"
+
+namespace scarp {
+namespace {
+
+/// The samples of a coarse tile with its halo, put together from those that finer tiles left.
+SampleGrid window_from_finer(StepRun& run) {
+  const TileScheme& scheme = run.plan().scheme;
+  const TileWindow window = scheme.window_with_halo(run.tile());
+  SampleGrid grid;
+  grid.columns = window.columns;
+  grid.rows = window.rows;
+  const std::size_t count =
+      static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows);
+  grid.positions.resize(count);
+  grid.known.assign(count, 0);
+  grid.void_cells.assign(count, 1);
+  for (const TileId& finer : tiles_under(scheme, run.tile())) {
+    const SampleGrid part = read_samples(*run.open(samples_file_name(finer)));
+    const TileWindow from = scheme.window(finer);
+    grid.cell_x_m = part.cell_x_m;
+    grid.cell_y_m = part.cell_y_m;
+    grid.bend_cells = part.bend_cells;
+    for (std::int32_t r = 0; r < part.rows; ++r) {
+      for (std::int32_t c = 0; c < part.columns; ++c) {
+        const std::int32_t column =
+            (from.first_column + c * window.stride - window.first_column) / window.stride;
+        const std::int32_t row =
+            (from.first_row + r * window.stride - window.first_row) / window.stride;
+        if (from.first_column + c * window.stride < window.first_column ||
+            from.first_row + r * window.stride < window.first_row || column >= window.columns ||
+            row >= window.rows)
+          continue;
+        const std::size_t to = grid.index(column, row), at = part.index(c, r);
+        grid.positions[to] = part.positions[at];
+        grid.known[to] = part.known[at];
+        // A cell is its own tile's: another one sees its upper left sample only.
+        if (c + 1 < part.columns && r + 1 < part.rows) grid.void_cells[to] = part.void_cells[at];
+      }
+    }
+  }
+  return grid;
+}
+
+/// A surface of the children of a tile, welded: their meshes, or what hides of them.
+Tin surface_below(StepRun& run, bool occluders) {
+  const TileScheme& scheme = run.plan().scheme;
+  std::vector<Tin> tins;
+  for (const TileId& child : scheme.children(run.tile())) {
+    const auto file =
+        run.open(occluders ? occluder_file_name(child) : tile_file_name(name_of(child), "tin"));
+    if (file) tins.push_back(read_tin(*file));
+  }
+  std::vector<const Tin*> parts;
+  for (const Tin& tin : tins) parts.push_back(&tin);
+  return weld(parts).tin;
+}
+
+}  // namespace
+
+void level_of_tile(StepRun& run) {
+  const BuildPlan& plan = run.plan();
+  const TileId tile = run.tile();
+  run.part("levels", [&](const Progress& progress) {
+    const SampleGrid grid = window_from_finer(run);
+    Mesh mesh = mesh_tile(plan.scheme, tile, grid, {.max_error_m = plan.max_error_m_of(tile.level)},
+                          progress);
+    if (tile.level > 0) hand_on_samples(run, grid);
+    if (mesh.tin.triangles.empty()) return;
+    run.facts = facts_of_mesh(mesh);
+    run.make(tile_file_name(name_of(tile), "tin"), "tin", [&](const std::string& path) {
+      write_tin(path, mesh.tin, mesh.sample_of_vertex, Existing::kReplace);
+    });
+    const bool above_finest = tile.level + 1 == plan.scheme.finest_level();
+    // How far this level lies from the finest: from the next one, and what that one has gathered.
+    SurfaceGap gap = measure_gap(mesh.tin, surface_below(run, false));
+    SurfaceGap below;
+    if (!above_finest) {
+      for (const TileId& child : plan.scheme.children(tile)) {
+        const nlohmann::json facts = run.facts_of(StepKind::kLevel, child);
+        if (!facts.contains("above_m")) continue;
+        below.above_m = std::max(below.above_m, facts["above_m"].get<double>());
+        below.below_m = std::max(below.below_m, facts["below_m"].get<double>());
+      }
+    }
+    run.facts["above_m"] = gap.above_m + below.above_m;
+    run.facts["below_m"] = gap.below_m + below.below_m;
+    const Occluder occluder =
+        lower_under(mesh.tin, mesh.sample_of_vertex, surface_below(run, !above_finest));
+    if (occluder.tin.triangles.empty()) return;
+    run.make(occluder_file_name(tile), "occluder", [&](const std::string& path) {
+      write_tin(path, occluder.tin, occluder.sample_of_vertex, Existing::kReplace);
+    });
+  });
+}
+
+void ranges_of_scene(StepRun& run) {
+  const TileScheme& scheme = run.plan().scheme;
+  run.part("ranges", [&](const Progress&) {
+    std::vector<TileRanges> finer;
+    double lowest_m = HUGE_VAL;
+    for (const TileId& tile : scheme.tiles(scheme.finest_level())) {
+      finer.push_back(read_ranges(*run.open(tile_file_name(name_of(tile), "range"))));
+      const nlohmann::json facts = run.facts_of(StepKind::kMesh, tile);
+      if (facts.contains("low")) lowest_m = std::min(lowest_m, facts["low"][2].get<double>());
+    }
+    run.facts["lowest_m"] = lowest_m;
+    for (std::int32_t level = scheme.finest_level() - 1; level >= 0; --level) {
+      std::vector<TileRanges> coarser;
+      for (const TileId& tile : scheme.tiles(level)) {
+        std::vector<QuarterRanges> quarters;
+        for (const TileId& child : scheme.children(tile))
+          quarters.push_back({child, &finer[scheme.number_of(child)]});
+        coarser.push_back(joined(scheme, tile, quarters));
+        run.make(tile_file_name(name_of(tile), "range"), "range", [&](const std::string& path) {
+          write_ranges(path, coarser.back(), Existing::kReplace);
+        });
+      }
+      finer = std::move(coarser);
+    }
+  });
+}
+
+}  // namespace scarp
