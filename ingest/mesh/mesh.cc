@@ -756,7 +756,11 @@ Mesh GreedyMesher::result() {
 }
 
 Mesh GreedyMesher::run() {
-  if (ground_.count() == 0) return {};
+  if (ground_.count() == 0) {
+    Mesh none;
+    none.lost_samples = count_lost_samples(grid_, range_);
+    return none;
+  }
   insert_border();
   goal_m_ = std::max(options_.max_error_m.value_or(0.0), kErrorRoundingM / 2);
   const std::uint32_t budget = options_.vertex_budget.value_or(kNone);
