@@ -9,9 +9,10 @@
 namespace scarp {
 namespace {
 
-/// A piece must not bend by more than this part of a cell, so that triangles which have a sample
-/// next to it for apex are sound (GreedyMesher::shape_repair).
-constexpr double kMostBendCells = 0.5;
+/// A piece strays from its samples by a quarter of bend times length squared. This much bend keeps
+/// it as near to them as borders are, and triangles that have a sample next to it for apex sound
+/// (GreedyMesher::shape_repair).
+constexpr double kMostBendCells = 4 * kBorderDeviationCells;
 
 constexpr std::array<int, 2> kSides = {-1, 1};
 
@@ -79,24 +80,10 @@ std::int32_t SharedEdge::place_to_cut(const Line& line, std::int32_t from, std::
   if (to - from == 1) return from;
   if (to - from > longest_cells_) return from + (to - from) / 2;
   Worst worst{max_error_m_, from};
-  if (strays(line, from, to, worst)) return worst.cut;
   for (const int side : kSides) look_along_samples(line, from, to, side, worst);
   if (worst.cut != from || bound_ == MeshBound::kSamples) return worst.cut;
   for (const int side : kSides) look_along_fans(line, from, to, side, worst);
   return worst.cut;
-}
-
-/// Whether a sample lies farther from the piece in the plane than borders may.
-bool SharedEdge::strays(const Line& line, std::int32_t from, std::int32_t to, Worst& worst) const {
-  const Position &a = line.on(from), &b = line.on(to);
-  const double dx = b.x_m - a.x_m, dy = b.y_m - a.y_m, length_m = std::hypot(dx, dy);
-  Worst farthest{kBorderDeviationCells * std::min(grid_.cell_x_m, grid_.cell_y_m), from};
-  for (std::int32_t i = from + 1; i < to; ++i) {
-    const Position& p = line.on(i);
-    farthest.take(std::abs(dx * (p.y_m - a.y_m) - dy * (p.x_m - a.x_m)) / length_m, i);
-  }
-  worst.cut = farthest.cut;
-  return farthest.cut != from;
 }
 
 /// Samples of the line against the triangle that the piece is a side of. Its apex is the sample

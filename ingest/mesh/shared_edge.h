@@ -37,7 +37,6 @@ class SharedEdge {
   struct Line;
   struct Worst;
   std::int32_t place_to_cut(const Line& line, std::int32_t from, std::int32_t to) const;
-  bool strays(const Line& line, std::int32_t from, std::int32_t to, Worst& worst) const;
   void look_along_samples(const Line& line, std::int32_t from, std::int32_t to, int side,
                           Worst& worst) const;
   void look_along_fans(const Line& line, std::int32_t from, std::int32_t to, int side,

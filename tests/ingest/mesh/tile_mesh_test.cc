@@ -27,7 +27,9 @@ MeshOptions within(double max_error_m, MeshBound bound = MeshBound::kSurface) {
 /// Ground of several kinds, from smooth to rough, some of it flat, with voids.
 SampleGrid random_ground(std::uint32_t seed) {
   std::mt19937 random(seed);
-  const auto below = [&](std::uint32_t count) { return static_cast<std::int32_t>(random() % count); };
+  const auto below = [&](std::uint32_t count) {
+    return static_cast<std::int32_t>(random() % count);
+  };
   const std::int32_t columns = 2 + below(40), rows = 2 + below(40);
   const int kind = below(5);
   const double rough_m = kind == 0 ? 0 : std::ldexp(1.0, below(6) - 1);
@@ -46,10 +48,9 @@ SampleGrid random_ground(std::uint32_t seed) {
     }
   };
   const bool is_bent = below(3) == 0;
-  SampleGrid grid =
-      is_bent ? bent_grid(columns, rows, 0.02, 60, height)
-              : flat_grid(columns, rows, below(2) == 0 ? 10 : 30.1, below(2) == 0 ? 10 : 21.7,
-                          height);
+  SampleGrid grid = is_bent ? bent_grid(columns, rows, 0.02, 60, height)
+                            : flat_grid(columns, rows, below(2) == 0 ? 10 : 30.1,
+                                        below(2) == 0 ? 10 : 21.7, height);
   for (int holes = below(4); holes > 0; --holes) {
     const std::int32_t c0 = below(static_cast<std::uint32_t>(columns)),
                        r0 = below(static_cast<std::uint32_t>(rows)), size = 1 + below(6);
@@ -117,6 +118,61 @@ TEST(TileMesh, ARasterOfOneTileIsMeshedAsWithoutTiles) {
     EXPECT_EQ(tile.sample_of_vertex, whole.sample_of_vertex);
     EXPECT_EQ(tile.error_over_surface_m, whole.error_over_surface_m);
     EXPECT_EQ(tile.lost_samples, whole.lost_samples);
+  }
+}
+
+/// Greatest distance of a sample on row `row` from the edge between its neighbours there, in cells.
+double stray_on_row_cells(const TiledLevel& level, std::int32_t row) {
+  std::vector<std::int32_t> columns;
+  for (const std::int64_t sample : level.whole.sample_of_vertex)
+    if (sample / level.grid.columns == row)
+      columns.push_back(static_cast<std::int32_t>(sample % level.grid.columns));
+  double farthest_m = 0;
+  for (std::size_t i = 0; i + 1 < columns.size(); ++i) {
+    const Position &a = level.grid.at(columns[i], row), &b = level.grid.at(columns[i + 1], row);
+    const double dx = b.x_m - a.x_m, dy = b.y_m - a.y_m;
+    for (std::int32_t c = columns[i] + 1; c < columns[i + 1]; ++c) {
+      const Position& p = level.grid.at(c, row);
+      farthest_m = std::max(
+          farthest_m, std::abs(dx * (p.y_m - a.y_m) - dy * (p.x_m - a.x_m)) / std::hypot(dx, dy));
+    }
+  }
+  return farthest_m / std::min(level.grid.cell_x_m, level.grid.cell_y_m);
+}
+
+/// Least height of a triangle over its longest edge, as a share of what that edge bends.
+double least_height_in_bends(const SampleGrid& grid, const Tin& tin) {
+  double least = HUGE_VAL;
+  for (const auto& corners : tin.triangles) {
+    const Position &a = tin.vertices[corners[0]], &b = tin.vertices[corners[1]],
+                   &c = tin.vertices[corners[2]];
+    const double longest_m = std::max({std::hypot(b.x_m - a.x_m, b.y_m - a.y_m),
+                                       std::hypot(c.x_m - b.x_m, c.y_m - b.y_m),
+                                       std::hypot(a.x_m - c.x_m, a.y_m - c.y_m)});
+    const double area_m2 = (b.x_m - a.x_m) * (c.y_m - a.y_m) - (b.y_m - a.y_m) * (c.x_m - a.x_m);
+    const double cells = longest_m / std::max(grid.cell_x_m, grid.cell_y_m);
+    least = std::min(
+        least, area_m2 / longest_m /
+                   (grid.bend_cells * cells * cells * std::min(grid.cell_x_m, grid.cell_y_m)));
+  }
+  return least;
+}
+
+TEST(TileMesh, EdgesThatBendAreCutHoweverLooseTheError) {
+  // Loose enough that heights ask for nothing: what is cut is cut because it bends.
+  for (const double cell_deg : {0.002, 0.004, 0.02, 0.1}) {
+    SCOPED_TRACE(cell_deg);
+    const SampleGrid raster =
+        bent_grid(160, 150, cell_deg, 60, [](std::int32_t, std::int32_t) { return 7.0; });
+    const TileScheme scheme(raster.columns, raster.rows, 64);
+    const TiledLevel level = mesh_level(raster, scheme, scheme.finest_level(), within(1e5));
+    expect_sound(level, 64, 1e5, MeshBound::kSurface);
+    for (const std::int32_t row : {64, 128}) {
+      EXPECT_GT(stray_on_row_cells(level, row), 0);
+      EXPECT_LE(stray_on_row_cells(level, row), kBorderDeviationCells);
+    }
+    // A chord strays by a quarter of bend times length squared, in cells.
+    EXPECT_GT(least_height_in_bends(raster, level.whole.tin), 0.25);
   }
 }
 

@@ -23,8 +23,8 @@ inline SampleGrid part_of(const SampleGrid& grid, const SampleWindow& window) {
   part.bend_cells = grid.bend_cells;
   for (std::int32_t r = 0; r < window.rows; ++r)
     for (std::int32_t c = 0; c < window.columns; ++c) {
-      const std::size_t i = grid.index(window.first_column / window.stride + c,
-                                       window.first_row / window.stride + r);
+      const std::size_t i =
+          grid.index(window.first_column / window.stride + c, window.first_row / window.stride + r);
       part.positions.push_back(grid.positions[i]);
       part.known.push_back(grid.known[i]);
       if (!grid.void_cells.empty()) part.void_cells.push_back(grid.void_cells[i]);
