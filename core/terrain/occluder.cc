@@ -211,7 +211,7 @@ Occluder lower_under(const Tin& coarse, std::span<const std::int64_t> sample_of_
   return part_of(lowered, sample_of_vertex, is_covered);
 }
 
-Occluder outside(const Occluder& occluder, std::int32_t columns, const SampleWindow& covered) {
+Occluder outside(const Occluder& occluder, std::int32_t columns, const TileWindow& covered) {
   const auto is_covered = [&](VertexIndex v) {
     const std::int64_t column = occluder.sample_of_vertex[v] % columns;
     const std::int64_t row = occluder.sample_of_vertex[v] / columns;

@@ -51,6 +51,6 @@ Occluder lower_under(const Tin& coarse, std::span<const std::int64_t> sample_of_
 /// The part of an occluder that is not wholly within a rectangle of the raster: what finer tiles
 /// hold need not be seen twice.
 /// @param columns  of the raster
-Occluder outside(const Occluder& occluder, std::int32_t columns, const SampleWindow& covered);
+Occluder outside(const Occluder& occluder, std::int32_t columns, const TileWindow& covered);
 
 }  // namespace scarp

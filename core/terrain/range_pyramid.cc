@@ -52,7 +52,7 @@ HeightRange TileRanges::whole() const {
 
 TileRanges ranges_of(const TileScheme& scheme, const TileId& tile, const SampleGrid& window) {
   assert(tile.level == scheme.finest_level());
-  const SampleWindow own = scheme.window(tile), with_halo = scheme.window_with_halo(tile);
+  const TileWindow own = scheme.window(tile), with_halo = scheme.window_with_halo(tile);
   assert(window.columns == with_halo.columns && window.rows == with_halo.rows);
   TileRanges ranges = empty_ranges(scheme, tile);
   const std::int32_t first_column = own.first_column - with_halo.first_column;

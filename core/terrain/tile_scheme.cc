@@ -81,7 +81,7 @@ TileId TileScheme::tile_at(std::int32_t level, std::int32_t column, std::int32_t
   return {level, column / cells, row / cells};
 }
 
-SampleWindow TileScheme::window(const TileId& tile) const {
+TileWindow TileScheme::window(const TileId& tile) const {
   assert(exists(tile));
   const std::int32_t step = stride(tile.level);
   const auto along = [&](std::int32_t index, std::int32_t samples) {
@@ -92,8 +92,8 @@ SampleWindow TileScheme::window(const TileId& tile) const {
           along(tile.column, columns_), along(tile.row, rows_), step};
 }
 
-SampleWindow TileScheme::window_with_halo(const TileId& tile) const {
-  SampleWindow window = this->window(tile);
+TileWindow TileScheme::window_with_halo(const TileId& tile) const {
+  TileWindow window = this->window(tile);
   const auto widen = [&](std::int32_t& first, std::int32_t& count, std::int32_t samples) {
     if (first + count * window.stride < samples) ++count;
     if (first > 0) {
@@ -121,7 +121,7 @@ std::vector<TileId> TileScheme::seen_from(const TileId& tile) const {
   return seen;
 }
 
-SampleWindow TileScheme::covered_by_finer(const TileId& tile, std::int32_t level) const {
+TileWindow TileScheme::covered_by_finer(const TileId& tile, std::int32_t level) const {
   assert(level < finest_level_);
   const std::int32_t up = finest_level_ - level - 1;
   const std::int32_t cells = tile_samples_ << up;

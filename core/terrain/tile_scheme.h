@@ -31,14 +31,14 @@ std::optional<TileId> tile_named(std::string_view name);
 
 /// Every stride-th sample of a rectangle of the raster: sample (i, j) of the window is sample
 /// (first_column + i * stride, first_row + j * stride) of the raster.
-struct SampleWindow {
+struct TileWindow {
   std::int32_t first_column = 0;
   std::int32_t first_row = 0;
   std::int32_t columns = 0;  ///< of the window, in samples
   std::int32_t rows = 0;
   std::int32_t stride = 1;
 
-  friend bool operator==(const SampleWindow&, const SampleWindow&) = default;
+  friend bool operator==(const TileWindow&, const TileWindow&) = default;
   /// The last samples, in the raster.
   std::int32_t last_column() const { return first_column + (columns - 1) * stride; }
   std::int32_t last_row() const { return first_row + (rows - 1) * stride; }
@@ -87,10 +87,10 @@ class TileScheme {
   TileId tile_at(std::int32_t level, std::int32_t column, std::int32_t row) const;
 
   /// A tile's own samples, edges included.
-  SampleWindow window(const TileId& tile) const;
+  TileWindow window(const TileId& tile) const;
   /// The same with one more sample of its level on each side where the raster has one: what it
   /// takes to mesh a tile (mesh_tile).
-  SampleWindow window_with_halo(const TileId& tile) const;
+  TileWindow window_with_halo(const TileId& tile) const;
 
   /// What the ground of a tile of the finest level is seen against, all of the scene: itself first,
   /// the other tiles around it, then for each level from the second finest on the tiles around its
@@ -100,7 +100,7 @@ class TileScheme {
   std::vector<TileId> seen_from(const TileId& tile) const;
   /// The rectangle of the raster that tiles finer than `level` hold in seen_from, stride 1. The
   /// last sample may lie beyond the raster. Requires level < finest_level().
-  SampleWindow covered_by_finer(const TileId& tile, std::int32_t level) const;
+  TileWindow covered_by_finer(const TileId& tile, std::int32_t level) const;
 
  private:
   std::int32_t tiles_over(std::int32_t samples, std::int32_t level) const;

@@ -799,7 +799,7 @@ Mesh mesh_tile(const TileScheme& scheme, const TileId& tile, const SampleGrid& w
                const MeshOptions& options, const Progress& progress) {
   check_options(window, options);
   assert(options.max_error_m.has_value());
-  const SampleWindow own = scheme.window(tile), with_halo = scheme.window_with_halo(tile);
+  const TileWindow own = scheme.window(tile), with_halo = scheme.window_with_halo(tile);
   assert(window.columns == with_halo.columns && window.rows == with_halo.rows);
   const GridNode first{(own.first_column - with_halo.first_column) / own.stride,
                        (own.first_row - with_halo.first_row) / own.stride};
