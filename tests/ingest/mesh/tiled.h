@@ -14,7 +14,7 @@
 namespace scarp::test {
 
 /// A part of a grid that is every stride-th sample of a raster already.
-inline SampleGrid part_of(const SampleGrid& grid, const SampleWindow& window) {
+inline SampleGrid part_of(const SampleGrid& grid, const TileWindow& window) {
   SampleGrid part;
   part.columns = window.columns;
   part.rows = window.rows;
