@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "ingest/mesh/mesh.h"
+#include "ingest/mesh/shared_edge.h"
 
 namespace scarp {
 namespace {
@@ -65,26 +66,25 @@ void append_line(std::int32_t first, std::int32_t last, const Side& side, const 
   }
 }
 
-/// Cuts edges between two tiles in the same way for both.
-class EdgeSimplifier {
- public:
-  EdgeSimplifier(const SampleGrid& grid, double max_error_m, MeshBound bound)
-      : grid_(grid), max_error_m_(max_error_m), bound_(bound) {}
-
-  void append(const BorderRun& run, TileBorder& border) const {
-    const GridNode step{run.to.column > run.from.column, run.to.row > run.from.row};
-    for (GridNode n = run.from; !(n == run.to);) {
-      const GridNode next{n.column + step.column, n.row + step.row};
-      border.runs.push_back({n, next});
-      n = next;
+/// Appends an edge between two tiles.
+void append_shared(const SharedEdge& edge, const SampleRange& range, const BorderRun& run,
+                   TileBorder& border) {
+  const auto is_corner = [&](const GridNode& n) {
+    return (n.column == range.first.column || n.column == range.last.column) &&
+           (n.row == range.first.row || n.row == range.last.row);
+  };
+  std::vector<GridNode> vertices;
+  edge.cut(run.from, run.to, is_corner(run.from), is_corner(run.to), vertices);
+  const GridNode step{run.to.column > run.from.column, run.to.row > run.from.row};
+  for (std::size_t i = 0; i + 1 < vertices.size(); ++i) {
+    border.runs.push_back({vertices[i], vertices[i + 1]});
+    for (GridNode n = vertices[i];;) {
+      n = {n.column + step.column, n.row + step.row};
+      if (n == vertices[i + 1]) break;
+      border.locked.push_back(n);
     }
   }
-
- private:
-  [[maybe_unused]] const SampleGrid& grid_;
-  [[maybe_unused]] const double max_error_m_;
-  [[maybe_unused]] const MeshBound bound_;
-};
+}
 
 }  // namespace
 
@@ -110,12 +110,12 @@ std::vector<BorderRun> ground_border(const SampleGrid& grid, const GroundCells& 
 TileBorder tile_border(const SampleGrid& grid, const GroundCells& ground, const SampleRange& range,
                        double max_error_m, MeshBound bound) {
   TileBorder border;
-  const EdgeSimplifier simplifier(grid, max_error_m, bound);
+  const SharedEdge shared(grid, max_error_m, bound);
   const auto append = [&](int side, const BorderRun& run) {
     if (side <= kShared)
       append_split(grid, run, border.runs);
     else
-      simplifier.append(run, border);
+      append_shared(shared, range, run, border);
   };
   /// Cells on both sides of a unit edge: which of them is the tile's ground, and whether ground
   /// lies across the edge of the tile.

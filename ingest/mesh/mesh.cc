@@ -14,12 +14,14 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <unordered_set>
 #include <utility>
 
 #include "core/error/error.h"
 #include "core/geodesy/predicates.h"
 #include "ingest/mesh/cell_walk.h"
 #include "ingest/mesh/ground.h"
+#include "ingest/mesh/height_plane.h"
 #include "ingest/mesh/plane_traits.h"
 #include "ingest/mesh/tile_mesh.h"
 
@@ -67,37 +69,6 @@ struct HeapEntry {
     return error_m != other.error_m ? error_m < other.error_m : target > other.target;
   }
 };
-
-/// A plane over the flattened x, y through three positions.
-struct HeightPlane {
-  double x_m, y_m, z_m, slope_x, slope_y;
-
-  HeightPlane(const Position& a, const Position& b, const Position& c)
-      : x_m(a.x_m), y_m(a.y_m), z_m(a.z_m) {
-    const double bx = b.x_m - a.x_m, by = b.y_m - a.y_m, bz = b.z_m - a.z_m;
-    const double cx = c.x_m - a.x_m, cy = c.y_m - a.y_m, cz = c.z_m - a.z_m;
-    const double inverse = 1 / (bx * cy - by * cx);
-    slope_x = (bz * cy - by * cz) * inverse;
-    slope_y = (bx * cz - bz * cx) * inverse;
-  }
-  double error_m(const Position& p) const {
-    return std::abs((p.z_m - z_m) - slope_x * (p.x_m - x_m) - slope_y * (p.y_m - y_m));
-  }
-};
-
-/// Vertical distance of the segments a - b and p - q where they cross in the plane.
-double crossing_error_m(const Position& a, const Position& b, const Position& p,
-                        const Position& q) {
-  const double dx = b.x_m - a.x_m, dy = b.y_m - a.y_m;
-  const double side_p = dx * (p.y_m - a.y_m) - dy * (p.x_m - a.x_m);
-  const double side_q = dx * (q.y_m - a.y_m) - dy * (q.x_m - a.x_m);
-  const double along_pq = side_p / (side_p - side_q);
-  const bool by_x = std::abs(dx) >= std::abs(dy);
-  const double reached = by_x ? p.x_m + along_pq * (q.x_m - p.x_m) - a.x_m
-                              : p.y_m + along_pq * (q.y_m - p.y_m) - a.y_m;
-  const double along_ab = reached / (by_x ? dx : dy);
-  return std::abs((p.z_m - a.z_m) + along_pq * (q.z_m - p.z_m) - along_ab * (b.z_m - a.z_m));
-}
 
 /// Whether all samples lie exactly on straight, evenly spaced grid lines. Then the sample plane and
 /// the flattened plane are affine images of each other and nothing needs to be tested for bending.
@@ -161,6 +132,15 @@ class GreedyMesher {
     const std::uint32_t lower = upper + static_cast<std::uint32_t>(grid_.columns);
     return is_vertex(upper) && is_vertex(upper + 1) && is_vertex(lower) && is_vertex(lower + 1);
   }
+  /// Whether a sample is kept out for the tile beyond the edge that it lies on.
+  bool is_locked(std::uint32_t sample) const { return !locked_.empty() && locked_[sample]; }
+  bool is_insertable(const GridNode& n) const {
+    return !is_vertex(index(n)) && !is_locked(index(n));
+  }
+  /// Whether nothing is left to be inserted that would help a cell.
+  bool is_settled(const GridNode& cell) const {
+    return is_resolved(cell) || (!settled_.empty() && settled_.contains(index(cell)));
+  }
   bool is_ground(Face f) const;
   double bend_cells_over(double length_cells) const {
     return affine_ ? 0 : grid_.bend_cells * length_cells * length_cells + rounding_cells_;
@@ -185,6 +165,8 @@ class GreedyMesher {
   bool belongs(Face f, const GridNode& n) const;
   std::optional<GridNode> shape_repair(Face f) const;
   std::pair<GridNode, Face> worst_corner(const GridNode& cell, Face near) const;
+  std::optional<GridNode> beside_locked(const GridNode& cell) const;
+  GridNode cell_beside(const GridNode& locked) const;
 
   // The result.
   void measure_all_edges();
@@ -206,6 +188,8 @@ class GreedyMesher {
   double rounding_cells_;  // how far rounding to the lattice moves samples against each other
   Triangulation cdt_;
   std::vector<VertexIndex> vertex_of_sample_;  // kNone where the sample is no vertex
+  std::vector<std::uint8_t> locked_;           // [samples], empty where there are none
+  std::unordered_set<std::uint32_t> settled_;  // cells beside locked samples
   std::vector<HeapEntry> heap_;
   std::vector<Face> open_;  // faces around a new vertex, still to be tested
   double goal_m_ = 0;
@@ -258,6 +242,8 @@ void GreedyMesher::insert_border() {
     vertex_of_sample_[index(vertices[i]->info())] = static_cast<VertexIndex>(i);
     near = vertices[i]->face();
   }
+  if (!border.locked.empty()) locked_.assign(vertex_of_sample_.size(), 0);
+  for (const GridNode& n : border.locked) locked_[index(n)] = 1;
   for (const BorderRun& run : runs)
     cdt_.insert_constraint(vertices[vertex_of_sample_[index(run.from)]],
                            vertices[vertex_of_sample_[index(run.to)]]);
@@ -366,8 +352,12 @@ void GreedyMesher::obey(const HeapEntry& entry) {
   GridNode n = node_at(entry.target & kTargetMask);
   Face near = entry.face;
   if ((entry.target & ~kTargetMask) == kResolveCell) {
-    std::tie(n, near) = worst_corner(n, near);
-    if (near == Face()) return scan(entry.face);  // resolved in the meantime
+    const GridNode cell = n;
+    std::tie(n, near) = worst_corner(cell, near);
+    if (near == Face()) {  // resolved in the meantime, or as far as it can be
+      if (!is_resolved(cell)) settled_.insert(index(cell));
+      return scan(entry.face);
+    }
   }
   if (is_vertex(index(n))) return scan(near);
   insert_sample(n, near);
@@ -383,7 +373,7 @@ std::pair<GridNode, Face> GreedyMesher::worst_corner(const GridNode& cell, Face 
   for (const int dr : {0, 1}) {
     for (const int dc : {0, 1}) {
       const GridNode n{cell.column + dc, cell.row + dr};
-      if (is_vertex(index(n))) continue;
+      if (!is_insertable(n)) continue;
       const Face f = cdt_.locate(point(n), near);
       double error_m = 0;
       if (!cdt_.is_infinite(f))
@@ -396,7 +386,40 @@ std::pair<GridNode, Face> GreedyMesher::worst_corner(const GridNode& cell, Face 
       }
     }
   }
+  if (worst.second == Face())
+    if (const auto n = beside_locked(cell)) worst = {*n, cdt_.locate(point(*n), near)};
   return worst;
+}
+
+/// Where a cell has a locked corner, the error can come from samples further along the edge that
+/// are no vertices yet: of those beside the same piece of the edge, the nearest to the cell.
+std::optional<GridNode> GreedyMesher::beside_locked(const GridNode& cell) const {
+  for (const int dr : {0, 1}) {
+    for (const int dc : {0, 1}) {
+      const GridNode n{cell.column + dc, cell.row + dr};
+      if (!is_locked(index(n))) continue;
+      const bool by_column = n.column == range_.first.column || n.column == range_.last.column;
+      const GridNode inwards{by_column ? 1 - 2 * dc : 0, by_column ? 0 : 1 - 2 * dr};
+      std::array<bool, 2> goes_on = {true, true};
+      for (std::int32_t away = 0; goes_on[0] || goes_on[1]; ++away) {
+        for (const int way : {0, 1}) {
+          if (!goes_on[static_cast<std::size_t>(way)]) continue;
+          const std::int32_t along = way == 0 ? away : -away;
+          const GridNode on{n.column + (by_column ? 0 : along), n.row + (by_column ? along : 0)};
+          goes_on[static_cast<std::size_t>(way)] = is_locked(index(on));
+          const GridNode inner{on.column + inwards.column, on.row + inwards.row};
+          if (is_insertable(inner)) return inner;
+        }
+      }
+    }
+  }
+  return {};
+}
+
+/// The cell of the tile's ground whose corners are looked at when a locked sample errs.
+GridNode GreedyMesher::cell_beside(const GridNode& locked) const {
+  return {std::min(locked.column, range_.last.column - 1),
+          std::min(locked.row, range_.last.row - 1)};
 }
 
 /// Finds the worst place of a face and puts it on the heap where it is above the goal.
@@ -476,7 +499,12 @@ Candidate GreedyMesher::worst_sample(const std::array<GridNode, 3>& n, Face f) c
     const auto look = [&](std::int32_t c) {
       const double error_m = plane.error_m(positions[c]);
       const std::uint32_t sample = row + static_cast<std::uint32_t>(c);
-      if (error_m > worst.error_m && !is_vertex(sample)) worst = {error_m, sample};
+      if (!(error_m > worst.error_m) || is_vertex(sample)) return;
+      if (!is_locked(sample)) {
+        worst = {error_m, sample};
+      } else if (const GridNode cell = cell_beside({c, r}); !is_settled(cell)) {
+        worst = {error_m, index(cell) | kResolveCell};
+      }
     };
     if (straight) {
       for (std::int32_t c = from; c <= to; ++c) look(c);
@@ -541,7 +569,7 @@ std::optional<GridNode> GreedyMesher::shape_repair(Face f) const {
   for (std::int32_t r = r0; r <= std::min(r0 + 1, grid_.rows - 1); ++r) {
     for (std::int32_t c = c0; c <= std::min(c0 + 1, grid_.columns - 1); ++c) {
       const double away = std::hypot(c - middle_column, r - middle_row);
-      if (away >= nearest_cells || is_vertex(index({c, r})) || !ground_.touches({c, r})) continue;
+      if (away >= nearest_cells || !is_insertable({c, r}) || !ground_.touches({c, r})) continue;
       nearest_cells = away;
       nearest = GridNode{c, r};
     }
@@ -576,7 +604,7 @@ Candidate GreedyMesher::worst_crossing_of_edge(Face f, int i) const {
   const auto look = [&](const GridNode& p, const GridNode& q, std::int32_t column,
                         std::int32_t row) {
     const double error_m = crossing_error_m(pa, pb, position(p), position(q));
-    if (error_m > worst.error_m && !is_resolved({column, row}))
+    if (error_m > worst.error_m && !is_settled({column, row}))
       worst = {error_m, index({column, row}) | kResolveCell};
   };
   if (affine_) {
@@ -615,7 +643,7 @@ Candidate GreedyMesher::worst_crossing_in_box(const GridNode& a, const GridNode&
       if (!ground_(c, r)) continue;
       const GridNode nw{c, r}, ne{c + 1, r}, sw{c, r + 1}, se{c + 1, r + 1};
       const std::uint32_t cell = index(nw);
-      if (is_resolved(nw)) continue;
+      if (is_settled(nw)) continue;
       look(nw, ne, cell);
       look(sw, se, cell);
       look(nw, sw, cell);
@@ -697,6 +725,15 @@ Mesh GreedyMesher::result() {
     mesh.tin.vertices.push_back(grid_.positions[sample]);
     mesh.sample_of_vertex.push_back(sample);
   }
+  if (!settled_.empty()) {
+    settled_.clear();
+    for (const Face f : cdt_.finite_face_handles()) {
+      if (!f->info().ground) continue;
+      f->info().sample_error_m =
+          worst_sample({corner(f, 0), corner(f, 1), corner(f, 2)}, f).error_m;
+      f->info().edge_error_m = worst_crossing(f).error_m;
+    }
+  }
   for (const Face f : cdt_.finite_face_handles()) {
     if (!f->info().ground) continue;
     if (!affine_ &&
@@ -719,7 +756,11 @@ Mesh GreedyMesher::result() {
 }
 
 Mesh GreedyMesher::run() {
-  if (ground_.count() == 0) return {};
+  if (ground_.count() == 0) {
+    Mesh none;
+    none.lost_samples = count_lost_samples(grid_, range_);
+    return none;
+  }
   insert_border();
   goal_m_ = std::max(options_.max_error_m.value_or(0.0), kErrorRoundingM / 2);
   const std::uint32_t budget = options_.vertex_budget.value_or(kNone);
