@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "cli/build/certified_settings.h"
 #include "core/culling/certified_culling.h"
 #include "core/culling/visible_groups.h"
@@ -20,7 +22,10 @@ namespace {
 }  // namespace
 
 bool has_horizons(const LoadedScene& scene) {
-  return scene.scene.find(kOnlyTile, "horizon") != nullptr;
+  const auto& tiles = scene.scene.description().tiles;
+  return std::any_of(tiles.begin(), tiles.end(), [&](const SceneTile& tile) {
+    return scene.scene.find(tile.id, "horizon") != nullptr;
+  });
 }
 
 std::unique_ptr<CullingMethod> culling_method(const LoadedScene& scene, const std::string& name) {
