@@ -90,9 +90,9 @@ void check_sectors(const BuildOptions& options) {
 
 void check_options(const BuildOptions& options) {
   if (options.dem_files.empty())
-    throw Error(ErrorCode::kUsage, "no DEM: one or several rasters were expected");
+    throw Error(ErrorCode::kUsage, "no DEM: one or several rasters were expected; see scarp build --help");
   if (options.scene.empty())
-    throw Error(ErrorCode::kUsage, "no scene to write: -o NAME was expected");
+    throw Error(ErrorCode::kUsage, "no scene to write: -o NAME was expected; see scarp build --help");
   if (options.max_error_m && !(*options.max_error_m >= 0 && *options.max_error_m < kLatticeReachM))
     throw Error(
         ErrorCode::kUsage,
@@ -101,13 +101,12 @@ void check_options(const BuildOptions& options) {
   check_sectors(options);
 }
 
-/// Whether a finished scene is what a plan makes.
+/// Whether a finished scene is what a plan makes: its report, the last file before scene.json, says.
 bool is_made_by(const std::string& path, const BuildPlan& plan) {
   if (!is_scene(path)) return false;
-  const Scene scene = open_scene(path);
-  const auto& parameters = scene.description().parameters;
-  const auto made_by = parameters.find("plan");
-  return made_by != parameters.end() && made_by->second == ParameterValue(plan.fingerprint);
+  const nlohmann::json report =
+      nlohmann::json::parse(std::ifstream(path + "/report.json"), nullptr, false);
+  return report.is_object() && report.value("plan", "") == plan.fingerprint;
 }
 
 /// A build that was killed between its last file and its name.

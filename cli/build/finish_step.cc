@@ -224,8 +224,7 @@ class Finish {
         {"group_triangles", std::int64_t{options.group_triangles}},
         {"min_group_triangles", std::int64_t{options.min_group_triangles}},
         {"seed", static_cast<std::int64_t>(options.seed)},
-        {"tile_samples", std::int64_t{plan_.scheme.tile_samples()}},
-        {"plan", plan_.fingerprint}};
+        {"tile_samples", std::int64_t{plan_.scheme.tile_samples()}}};
     for (const PlanStep& step : plan_.steps) {
       if (step.kind != StepKind::kGroups) continue;
       const json facts = run_.facts_of(StepKind::kGroups, step.tile);

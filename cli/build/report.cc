@@ -215,6 +215,7 @@ json build_report(const StepRun& run, const std::optional<MapPoint>& observer) {
       if (tile.contains("warnings"))
         for (const json& warning : tile["warnings"]) report["warnings"].push_back(warning);
   report["versions"] = library_versions();
+  report["plan"] = plan.fingerprint;
   return report;
 }
 

@@ -70,7 +70,7 @@ TEST_F(BuiltScene, ReportTellsWhatWasDone) {
     EXPECT_GE(stage["seconds"], 0);
     EXPECT_GT(stage["peak_memory_bytes"], 1 << 20);
   }
-  EXPECT_EQ(stages, (std::set<std::string>{"read", "place", "mesh", "horizons", "groups", "certify",
+  EXPECT_EQ(stages, (std::set<std::string>{"read", "mesh", "horizons", "groups", "certify",
                                            "verify", "layers", "preview"}));
   EXPECT_EQ(report["certified"]["fans"], 8);
   EXPECT_LE(report["certified"]["bytes"], 16 * report["mesh"]["triangles"].get<double>());
