@@ -4,9 +4,11 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <limits>
 
 #include "core/geodesy/predicates.h"
 #include "core/terrain/plan_bins.h"
+#include "core/terrain/weld.h"
 #include "core/threads/parallel_for.h"
 
 namespace scarp {
@@ -211,16 +213,60 @@ Occluder lower_under(const Tin& coarse, std::span<const std::int64_t> sample_of_
   return part_of(lowered, sample_of_vertex, is_covered);
 }
 
-Occluder outside(const Occluder& occluder, std::int32_t columns, const TileWindow& covered) {
-  const auto is_covered = [&](VertexIndex v) {
-    const std::int64_t column = occluder.sample_of_vertex[v] % columns;
-    const std::int64_t row = occluder.sample_of_vertex[v] / columns;
-    return column >= covered.first_column && column <= covered.last_column() &&
-           row >= covered.first_row && row <= covered.last_row();
-  };
-  return part_of(occluder.tin, occluder.sample_of_vertex, [&](std::size_t t) {
-    const auto& [a, b, c] = occluder.tin.triangles[t];
-    return !(is_covered(a) && is_covered(b) && is_covered(c));
+namespace {
+
+/// A triangle's corners in samples of the raster, as a box.
+struct SampleBox {
+  std::int64_t low_column, low_row, high_column, high_row;
+};
+
+SampleBox box_of(const SeenTile& tile, std::int32_t columns, std::size_t triangle) {
+  SampleBox box{columns, std::numeric_limits<std::int64_t>::max(), -1, -1};
+  for (const VertexIndex v : tile.tin->triangles[triangle]) {
+    const std::int64_t column = tile.sample_of_vertex[v] % columns;
+    const std::int64_t row = tile.sample_of_vertex[v] / columns;
+    box.low_column = std::min(box.low_column, column);
+    box.high_column = std::max(box.high_column, column);
+    box.low_row = std::min(box.low_row, row);
+    box.high_row = std::max(box.high_row, row);
+  }
+  return box;
+}
+
+/// What of finer tiles can lie under a tile, as one surface.
+Tin surface_under(const TileScheme& scheme, const TileId& tile, std::span<const SeenTile> finer) {
+  const TileWindow window = scheme.window_with_halo(tile);
+  std::vector<Occluder> near;
+  for (const SeenTile& part : finer) {
+    assert(part.id.level == tile.level + 1);
+    near.push_back(part_of(*part.tin, part.sample_of_vertex, [&](std::size_t t) {
+      const SampleBox box = box_of(part, scheme.columns(), t);
+      return box.low_column <= window.last_column() && box.high_column >= window.first_column &&
+             box.low_row <= window.last_row() && box.high_row >= window.first_row;
+    }));
+  }
+  std::vector<const Tin*> parts;
+  for (const Occluder& part : near) parts.push_back(&part.tin);
+  return weld(parts).tin;
+}
+
+}  // namespace
+
+Occluder occluder_of(const TileScheme& scheme, const SeenTile& coarse,
+                     std::span<const SeenTile> finer) {
+  return lower_under(*coarse.tin, coarse.sample_of_vertex, surface_under(scheme, coarse.id, finer));
+}
+
+SurfaceGap gap_of(const TileScheme& scheme, const SeenTile& coarse,
+                  std::span<const SeenTile> finer) {
+  return measure_gap(*coarse.tin, surface_under(scheme, coarse.id, finer));
+}
+
+Occluder outside(const SeenTile& tile, std::int32_t columns, const TileWindow& covered) {
+  return part_of(*tile.tin, tile.sample_of_vertex, [&](std::size_t t) {
+    const SampleBox box = box_of(tile, columns, t);
+    return box.low_column < covered.first_column || box.high_column > covered.last_column() ||
+           box.low_row < covered.first_row || box.high_row > covered.last_row();
   });
 }
 

@@ -48,9 +48,30 @@ struct Occluder {
 Occluder lower_under(const Tin& coarse, std::span<const std::int64_t> sample_of_vertex,
                      const Tin& finer);
 
-/// The part of an occluder that is not wholly within a rectangle of the raster: what finer tiles
-/// hold need not be seen twice.
+/// A tile's surface: its mesh at the finest level, its mesh or its occluder at coarser ones.
+struct SeenTile {
+  TileId id;
+  const Tin* tin = nullptr;
+  std::span<const std::int64_t> sample_of_vertex = {};
+};
+
+/// The occluder of a tile.
+/// @param coarse  the tile's mesh
+/// @param finer   scheme.finer_around(coarse.id) in its order, meshes of the finest level or
+///                occluders; those that have no triangle may be left out. The ones beside the tile
+///                matter where grid lines bend or samples are rounded: its edges run over them
+/// Side, cost: as lower_under.
+Occluder occluder_of(const TileScheme& scheme, const SeenTile& coarse,
+                     std::span<const SeenTile> finer);
+
+/// How far a tile's mesh lies from those of the next finer level, given in the same way but always
+/// meshes. From the finest it lies no farther than this and the greatest of its children together.
+SurfaceGap gap_of(const TileScheme& scheme, const SeenTile& coarse,
+                  std::span<const SeenTile> finer);
+
+/// The part of a surface that is not wholly within a rectangle of the raster: what finer tiles hold
+/// need not be seen twice.
 /// @param columns  of the raster
-Occluder outside(const Occluder& occluder, std::int32_t columns, const TileWindow& covered);
+Occluder outside(const SeenTile& tile, std::int32_t columns, const TileWindow& covered);
 
 }  // namespace scarp

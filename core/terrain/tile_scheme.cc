@@ -106,6 +106,14 @@ TileWindow TileScheme::window_with_halo(const TileId& tile) const {
   return window;
 }
 
+std::vector<TileId> TileScheme::finer_around(const TileId& tile) const {
+  std::vector<TileId> found;
+  for (std::int32_t row = 2 * tile.row - 1; row <= 2 * tile.row + 2; ++row)
+    for (std::int32_t column = 2 * tile.column - 1; column <= 2 * tile.column + 2; ++column)
+      if (const TileId finer{tile.level + 1, column, row}; exists(finer)) found.push_back(finer);
+  return found;
+}
+
 std::vector<TileId> TileScheme::seen_from(const TileId& tile) const {
   assert(tile.level == finest_level_ && exists(tile));
   std::vector<TileId> seen{tile};

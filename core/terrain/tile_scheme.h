@@ -92,6 +92,10 @@ class TileScheme {
   /// takes to mesh a tile (mesh_tile).
   TileWindow window_with_halo(const TileId& tile) const;
 
+  /// Tiles of the next finer level that have samples in the halo of a tile, row by row: its
+  /// children and those beside them. None at the finest level.
+  std::vector<TileId> finer_around(const TileId& tile) const;
+
   /// What the ground of a tile of the finest level is seen against, all of the scene: itself first,
   /// the other tiles around it, then for each level from the second finest on the tiles around its
   /// ancestor, the ancestor left out. Each level in rows, from fine to coarse. All ground that is

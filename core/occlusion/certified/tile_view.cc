@@ -3,7 +3,6 @@
 #include <cassert>
 
 #include "core/occlusion/certified/certify_groups.h"
-#include "core/terrain/occluder.h"
 #include "core/terrain/weld.h"
 
 namespace scarp {
@@ -35,9 +34,7 @@ Tin level_of(const TileScheme& scheme, std::span<const SeenTile> seen, std::int3
       parts.push_back(tile.tin);
       continue;
     }
-    const Occluder whole{*tile.tin, {tile.sample_of_vertex.begin(), tile.sample_of_vertex.end()}};
-    cut.push_back(
-        outside(whole, scheme.columns(), scheme.covered_by_finer(seen.front().id, level)));
+    cut.push_back(outside(tile, scheme.columns(), scheme.covered_by_finer(seen.front().id, level)));
     parts.push_back(&cut.back().tin);
   }
   return weld(parts).tin;

@@ -7,6 +7,7 @@
 
 #include "core/occlusion/certified/certified_regions.h"
 #include "core/occlusion/certified/hiding_bounds.h"
+#include "core/terrain/occluder.h"
 #include "core/terrain/tile_scheme.h"
 #include "core/terrain/tin.h"
 #include "core/threads/progress.h"
@@ -20,18 +21,12 @@ struct TileView {
   std::size_t own_triangles = 0;  ///< these come first, in the tile's own order
 };
 
-/// A tile as the ground around another one.
-struct SeenTile {
-  TileId id;
-  const Tin* tin = nullptr;  ///< the mesh at the finest level, the occluder at coarser ones
-  std::span<const std::int64_t> sample_of_vertex = {};
-};
-
 /// What a tile sees: itself and the tiles around it at full detail, welded, and occluders of ever
 /// coarser levels for the rest of the scene, welded by level, without what finer tiles hold.
 ///
-/// @param seen  scheme.seen_from(tile) in its order, the tile itself first; those that have no
-///              triangle may be left out, but not the tile itself
+/// @param seen  scheme.seen_from(tile) in its order, the tile itself first: meshes of the finest
+///              level, occluders of the others. Those that have no triangle may be left out, but
+///              not the tile itself
 /// All of it lies on or under the finest meshes, in its own tile on them.
 /// Cost: O(n), and O(b log b) for b border vertices.
 TileView view_of_tile(const TileScheme& scheme, std::span<const SeenTile> seen);

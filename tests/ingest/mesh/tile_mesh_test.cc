@@ -86,21 +86,27 @@ void expect_sound(const TiledLevel& level, std::int32_t tile_samples, double max
   }
 }
 
+void expect_sound_at_all_levels(std::uint32_t seed) {
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  const SampleGrid raster = random_ground(seed);
+  const std::int32_t tile_samples = 2 << seed % 4;
+  const TileScheme scheme(raster.columns, raster.rows, tile_samples);
+  const MeshBound bound = seed % 5 == 0 ? MeshBound::kSamples : MeshBound::kSurface;
+  for (std::int32_t level = 0; level <= scheme.finest_level(); ++level) {
+    SCOPED_TRACE("level " + std::to_string(level));
+    const double max_error_m = 1.5 * scheme.stride(level);
+    expect_sound(mesh_level(raster, scheme, level, within(max_error_m, bound)), tile_samples,
+                 max_error_m, bound);
+  }
+}
+
 TEST(TileMesh, AllTilesOfALevelAreOneSurfaceWithinTheError) {
-  for (std::uint32_t seed = 0; seed < 700; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const SampleGrid raster = random_ground(seed);
-    const std::int32_t tile_samples = 2 << seed % 4;
-    const TileScheme scheme(raster.columns, raster.rows, tile_samples);
-    const MeshBound bound = seed % 5 == 0 ? MeshBound::kSamples : MeshBound::kSurface;
-    for (std::int32_t level = 0; level <= scheme.finest_level(); ++level) {
-      SCOPED_TRACE("level " + std::to_string(level));
-      const double max_error_m = 1.5 * scheme.stride(level);
-      expect_sound(mesh_level(raster, scheme, level, within(max_error_m, bound)), tile_samples,
-                   max_error_m, bound);
-    }
+  for (std::uint32_t seed = 0; seed < 600; ++seed) {
+    expect_sound_at_all_levels(seed);
     if (testing::Test::HasFailure()) break;
   }
+  // A cell beside a locked sample errs by a vertex that is missing further along the edge.
+  expect_sound_at_all_levels(2706);
 }
 
 TEST(TileMesh, ARasterOfOneTileIsMeshedAsWithoutTiles) {

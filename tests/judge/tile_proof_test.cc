@@ -1,0 +1,180 @@
+// Groups of tiles are certified against a view of the scene: full detail near by, lowered coarse
+// levels beyond. No region hides what is visible over the whole finest surface.
+
+#include <gtest/gtest.h>
+
+#include <cinttypes>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <random>
+
+#include "core/sight/triangle_sight.h"
+#include "tests/ingest/mesh/grids.h"
+#include "tests/judge/dem_window.h"
+#include "tests/judge/tiled_scene.h"
+#include "tests/support/boundary_search.h"
+#include "tests/support/shared_data.h"
+#include "tests/support/terrain.h"
+
+namespace scarp {
+namespace {
+
+using test::TiledOptions;
+using test::TiledScene;
+
+struct Counts {
+  std::uint64_t judged = 0;
+  std::uint64_t false_culls = 0;
+  std::uint64_t hidden_triangles = 0;  // by the judge
+  std::uint64_t culled_triangles = 0;
+};
+
+/// Judges every group that is culled from an eye.
+void look_from(const TiledScene& scene, const TinIndex& index, const Position& eye,
+               Counts& counts) {
+  const std::vector<TriangleSight> sight = judge_all(index, eye);
+  for (const TriangleSight s : sight) counts.hidden_triangles += s == TriangleSight::kHidden;
+  for (const test::TileOfScene& tile : scene.tiles) {
+    for (GroupIndex g = 0; g < tile.groups; ++g) {
+      if (!hides_group(tile.regions, g, eye)) continue;
+      ++counts.judged;
+      counts.culled_triangles += tile.members[g].size();
+      bool is_seen = false;
+      for (const TriangleIndex t : tile.members[g])
+        is_seen = is_seen || sight[t] == TriangleSight::kVisible;
+      counts.false_culls += is_seen;
+      if (is_seen) {
+        ADD_FAILURE() << "group " << g << " of tile " << name_of(tile.id)
+                      << " is culled and visible from " << eye.x_m << " " << eye.y_m << " "
+                      << eye.z_m;
+      }
+    }
+  }
+}
+
+/// Eyes over random places, over the edges of tiles, and outside.
+Counts prove(const TiledScene& scene, std::uint64_t seed, int eyes) {
+  const TinIndex index(scene.whole);
+  const Bounds bounds = bounds_of(scene.whole.vertices);
+  std::mt19937_64 random(seed);
+  const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
+  Counts counts;
+  std::vector<Position> on_edges;
+  for (const auto& [id, mesh] : scene.meshes)
+    if (id.level == scene.scheme.finest_level())
+      for (std::size_t t = 0; t < mesh.tin.triangles.size(); ++t)
+        for (std::size_t i = 0; i < 3; ++i)
+          if (mesh.tin.neighbours[t][i] == kNone)
+            on_edges.push_back(mesh.tin.vertices[mesh.tin.triangles[t][(i + 1) % 3]]);
+  for (int i = 0; i < eyes; ++i) {
+    Position eye;
+    if (i % 3 == 0) {
+      eye = on_edges[random() % on_edges.size()];
+      eye.x_m += round_to_lattice(unit());
+    } else {
+      const double wider = i % 3 == 1 ? 0 : 0.3;
+      eye.x_m = bounds.low.x_m - wider * (bounds.high.x_m - bounds.low.x_m) +
+                (1 + 2 * wider) * unit() * (bounds.high.x_m - bounds.low.x_m);
+      eye.y_m = bounds.low.y_m - wider * (bounds.high.y_m - bounds.low.y_m) +
+                (1 + 2 * wider) * unit() * (bounds.high.y_m - bounds.low.y_m);
+    }
+    eye = round_to_lattice(eye);
+    const double relief_m = bounds.high.z_m - bounds.low.z_m + 1;
+    const double ground_m = index.ground_height_m(eye.x_m, eye.y_m).value_or(bounds.low.z_m);
+    const double above_m[] = {2, 0.05 * relief_m, 0.3 * unit() * relief_m, unit() * relief_m};
+    eye.z_m = round_to_lattice(ground_m + above_m[random() % 4]);
+    look_from(scene, index, eye, counts);
+    if (testing::Test::HasFailure()) break;
+  }
+  return counts;
+}
+
+/// Cameras just inside the boundaries of regions.
+std::uint64_t prove_boundaries(const TiledScene& scene, const test::BoundarySearch& search) {
+  const TinIndex index(scene.whole);
+  std::uint64_t judged = 0;
+  for (const test::TileOfScene& tile : scene.tiles) {
+    const test::BoundaryFinding found =
+        test::search_boundaries(index, tile.regions, tile.members, search);
+    judged += found.judged;
+    EXPECT_EQ(found.false_culls, 0U)
+        << "the first: group " << found.group << " of tile " << name_of(tile.id)
+        << " is culled and visible from " << found.eye.x_m << " " << found.eye.y_m << " "
+        << found.eye.z_m;
+  }
+  return judged;
+}
+
+TiledOptions small_tiles() {
+  TiledOptions options;
+  options.tile_samples = 8;
+  options.max_error_m = 2;
+  options.group_triangles = 8;
+  options.hiding.fans = 64;
+  options.hiding.sectors = 64;
+  return options;
+}
+
+/// Terrains of the kinds where methods fail, by number.
+SampleGrid hard_terrain(std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
+  const auto columns = static_cast<std::int32_t>(30 + random() % 20);
+  const auto rows = static_cast<std::int32_t>(30 + random() % 20);
+  switch (seed % 6) {
+    case 0:
+      return test::random_hills(columns, rows, 10, seed, 150, 0.01);
+    case 1:
+      return test::random_hills(columns, rows, 10, seed, 80, 15);  // terraces
+    case 2:
+      return test::random_hills(columns, rows, 10, seed, 150, 0.1, 0.2);  // voids
+    case 3:                                                               // spikes and pits
+      return test::grid_of(columns, rows, 10, [&](int, int) {
+        return unit() < 0.05 ? 200 * unit() : unit() < 0.03 ? -100 : 5 * unit();
+      });
+    case 4:  // walls next to edges of tiles
+      return test::grid_of(columns, rows, 10, [&](int c, int r) {
+        return c % 8 == 1 || r % 16 == 7 ? 60.0 + unit() : 3 * unit();
+      });
+    default:  // grid lines that bend
+      return test::bent_grid(columns, rows, 0.01, 60, [&](std::int32_t c, std::int32_t r) {
+        return 900 * std::sin(0.3 * c) * std::cos(0.2 * r) + 60 * unit();
+      });
+  }
+}
+
+TEST(TileProof, NothingThatATileCullsIsVisible) {
+  Counts all;
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
+    SCOPED_TRACE("terrain " + std::to_string(seed));
+    const TiledScene scene = test::tiled_scene(hard_terrain(seed), small_tiles());
+    if (scene.tiles.empty()) continue;
+    EXPECT_EQ(check_tin(scene.whole), std::nullopt);
+    const Counts counts = prove(scene, seed, 60);
+    all.judged += counts.judged;
+    all.hidden_triangles += counts.hidden_triangles;
+    all.culled_triangles += counts.culled_triangles;
+    if (testing::Test::HasFailure()) break;
+  }
+  std::printf("%" PRIu64 " culled groups judged; %.3f of hidden triangles culled\n", all.judged,
+              double(all.culled_triangles) / double(all.hidden_triangles));
+  EXPECT_GT(all.judged, 1000U);
+}
+
+TEST(TileProof, NothingIsVisibleFromJustInsideTheBoundariesOfATilesRegions) {
+  for (std::uint64_t seed = 0; seed < 6; ++seed) {
+    SCOPED_TRACE("terrain " + std::to_string(seed));
+    const TiledScene scene = test::tiled_scene(hard_terrain(seed), small_tiles());
+    if (scene.tiles.empty()) continue;
+    test::BoundarySearch search;
+    search.seed = seed + 1;
+    search.starts = 3;
+    search.steps = 8;
+    EXPECT_GT(prove_boundaries(scene, search), 100U);
+    if (testing::Test::HasFailure()) break;
+  }
+}
+
+}  // namespace
+}  // namespace scarp
