@@ -104,12 +104,10 @@ class Planner {
   void add_level(const TileId& tile) {
     const bool above_finest = tile.level + 1 == scheme_.finest_level();
     PlanStep step{StepKind::kLevel, tile, {}, {}, {}, mesh_bytes(tile), kMeshS * samples_of(tile)};
-    // The samples of its quarters, and of those beside them for one more row and column.
-    for (const TileId& near : tiles_under(scheme_, tile))
-      step.inputs.push_back(samples_file_name(near));
-    for (const TileId& child : scheme_.children(tile)) {
-      step.inputs.push_back(tile_file(child, "tin"));
-      if (!above_finest) step.inputs.push_back(occluder_file_name(child));
+    for (const TileId& finer : scheme_.finer_around(tile)) {
+      step.inputs.push_back(samples_file_name(finer));
+      step.inputs.push_back(tile_file(finer, "tin"));
+      if (!above_finest) step.inputs.push_back(occluder_file_name(finer));
     }
     step.outputs = {tile_file(tile, "tin"), occluder_file_name(tile)};
     if (tile.level > 0) step.outputs.push_back(samples_file_name(tile));
@@ -288,18 +286,6 @@ const char* option_for_one_tile(const BuildOptions& options) {
   if (has_stewart(options.horizon)) return "--horizon stewart or both";
   if (options.budget.seconds) return "a --budget of time";
   return nullptr;
-}
-
-std::vector<TileId> tiles_under(const TileScheme& scheme, const TileId& tile) {
-  const TileWindow window = scheme.window_with_halo(tile);
-  const std::int32_t level = tile.level + 1;
-  const std::int32_t cells = scheme.tile_samples() * scheme.stride(level);
-  std::vector<TileId> tiles;
-  for (std::int32_t row = window.first_row / cells; row <= (window.last_row() - 1) / cells; ++row)
-    for (std::int32_t column = window.first_column / cells;
-         column <= (window.last_column() - 1) / cells; ++column)
-      if (const TileId id{level, column, row}; scheme.exists(id)) tiles.push_back(id);
-  return tiles;
 }
 
 BuildPlan make_plan(const BuildOptions& options) {

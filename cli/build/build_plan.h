@@ -84,9 +84,6 @@ StoredPlan read_plan(const std::string& path);
 /// @return the first such option as it is typed, or null
 const char* option_for_one_tile(const BuildOptions& options);
 
-/// The tiles of the next finer level that hold samples of a tile's window_with_halo.
-std::vector<TileId> tiles_under(const TileScheme& scheme, const TileId& tile);
-
 /// Files that steps hand on and that are no part of the finished scene: every other sample of a
 /// tile, for the next coarser level; what hides of a coarser tile; the groups of a tile's samples.
 std::string samples_file_name(const TileId& tile);

@@ -3,7 +3,6 @@
 #include "cli/build/step_run.h"
 #include "core/terrain/occluder.h"
 #include "core/terrain/range_pyramid.h"
-#include "core/terrain/weld.h"
 #include "ingest/mesh/tile_mesh.h"
 #include "tiles/store/range_file.h"
 #include "tiles/store/samples_file.h"
@@ -24,7 +23,7 @@ SampleGrid window_from_finer(StepRun& run) {
   grid.positions.resize(count);
   grid.known.assign(count, 0);
   grid.void_cells.assign(count, 1);
-  for (const TileId& finer : tiles_under(scheme, run.tile())) {
+  for (const TileId& finer : scheme.finer_around(run.tile())) {
     const SampleGrid part = read_samples(*run.open(samples_file_name(finer)));
     const TileWindow from = scheme.window(finer);
     grid.cell_x_m = part.cell_x_m;
@@ -51,18 +50,47 @@ SampleGrid window_from_finer(StepRun& run) {
   return grid;
 }
 
-/// A surface of the children of a tile, welded: their meshes, or what hides of them.
-Tin surface_below(StepRun& run, bool occluders) {
-  const TileScheme& scheme = run.plan().scheme;
-  std::vector<Tin> tins;
-  for (const TileId& child : scheme.children(run.tile())) {
-    const auto file =
-        run.open(occluders ? occluder_file_name(child) : tile_file_name(name_of(child), "tin"));
-    if (file) tins.push_back(read_tin(*file));
+/// Surfaces of the tiles under a coarse one and beside those: their meshes, or what hides of them.
+class FinerGround {
+ public:
+  FinerGround(StepRun& run, bool occluders) {
+    for (const TileId& id : run.plan().scheme.finer_around(run.tile())) {
+      const auto file =
+          run.open(occluders ? occluder_file_name(id) : tile_file_name(name_of(id), "tin"));
+      if (!file) continue;
+      ids_.push_back(id);
+      tins_.push_back(read_tin(*file));
+      samples_.push_back(read_sample_of_vertex(*file));
+    }
   }
-  std::vector<const Tin*> parts;
-  for (const Tin& tin : tins) parts.push_back(&tin);
-  return weld(parts).tin;
+
+  std::vector<SeenTile> tiles() const {
+    std::vector<SeenTile> tiles;
+    for (std::size_t i = 0; i < ids_.size(); ++i)
+      tiles.push_back({ids_[i], &tins_[i], samples_[i]});
+    return tiles;
+  }
+
+ private:
+  std::vector<TileId> ids_;
+  std::vector<Tin> tins_;
+  std::vector<std::vector<std::int64_t>> samples_;
+};
+
+/// How far this level lies from the finest: from the next one, and what that one has gathered.
+SurfaceGap gap_from_finest(StepRun& run, const SeenTile& coarse, const FinerGround& finer) {
+  const TileScheme& scheme = run.plan().scheme;
+  SurfaceGap gathered;
+  if (coarse.id.level + 1 < scheme.finest_level()) {
+    for (const TileId& child : scheme.children(coarse.id)) {
+      const nlohmann::json facts = run.facts_of(StepKind::kLevel, child);
+      if (!facts.contains("above_m")) continue;
+      gathered.above_m = std::max(gathered.above_m, facts["above_m"].get<double>());
+      gathered.below_m = std::max(gathered.below_m, facts["below_m"].get<double>());
+    }
+  }
+  const SurfaceGap gap = gap_of(scheme, coarse, finer.tiles());
+  return {gap.above_m + gathered.above_m, gap.below_m + gathered.below_m};
 }
 
 }  // namespace
@@ -80,22 +108,13 @@ void level_of_tile(StepRun& run) {
     run.make(tile_file_name(name_of(tile), "tin"), "tin", [&](const std::string& path) {
       write_tin(path, mesh.tin, mesh.sample_of_vertex, Existing::kReplace);
     });
-    const bool above_finest = tile.level + 1 == plan.scheme.finest_level();
-    // How far this level lies from the finest: from the next one, and what that one has gathered.
-    SurfaceGap gap = measure_gap(mesh.tin, surface_below(run, false));
-    SurfaceGap below;
-    if (!above_finest) {
-      for (const TileId& child : plan.scheme.children(tile)) {
-        const nlohmann::json facts = run.facts_of(StepKind::kLevel, child);
-        if (!facts.contains("above_m")) continue;
-        below.above_m = std::max(below.above_m, facts["above_m"].get<double>());
-        below.below_m = std::max(below.below_m, facts["below_m"].get<double>());
-      }
-    }
-    run.facts["above_m"] = gap.above_m + below.above_m;
-    run.facts["below_m"] = gap.below_m + below.below_m;
-    const Occluder occluder =
-        lower_under(mesh.tin, mesh.sample_of_vertex, surface_below(run, !above_finest));
+    const SeenTile coarse{tile, &mesh.tin, mesh.sample_of_vertex};
+    FinerGround finer(run, false);
+    const SurfaceGap gap = gap_from_finest(run, coarse, finer);
+    run.facts["above_m"] = gap.above_m;
+    run.facts["below_m"] = gap.below_m;
+    if (tile.level + 1 < plan.scheme.finest_level()) finer = FinerGround(run, true);
+    const Occluder occluder = occluder_of(plan.scheme, coarse, finer.tiles());
     if (occluder.tin.triangles.empty()) return;
     run.make(occluder_file_name(tile), "occluder", [&](const std::string& path) {
       write_tin(path, occluder.tin, occluder.sample_of_vertex, Existing::kReplace);
