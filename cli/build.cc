@@ -90,9 +90,11 @@ void check_sectors(const BuildOptions& options) {
 
 void check_options(const BuildOptions& options) {
   if (options.dem_files.empty())
-    throw Error(ErrorCode::kUsage, "no DEM: one or several rasters were expected; see scarp build --help");
+    throw Error(ErrorCode::kUsage,
+                "no DEM: one or several rasters were expected; see scarp build --help");
   if (options.scene.empty())
-    throw Error(ErrorCode::kUsage, "no scene to write: -o NAME was expected; see scarp build --help");
+    throw Error(ErrorCode::kUsage,
+                "no scene to write: -o NAME was expected; see scarp build --help");
   if (options.max_error_m && !(*options.max_error_m >= 0 && *options.max_error_m < kLatticeReachM))
     throw Error(
         ErrorCode::kUsage,
@@ -101,7 +103,8 @@ void check_options(const BuildOptions& options) {
   check_sectors(options);
 }
 
-/// Whether a finished scene is what a plan makes: its report, the last file before scene.json, says.
+/// Whether a finished scene is what a plan makes: its report, the last file before scene.json,
+/// says.
 bool is_made_by(const std::string& path, const BuildPlan& plan) {
   if (!is_scene(path)) return false;
   const nlohmann::json report =

@@ -328,6 +328,9 @@ void add_cull(CLI::App& app, CullOptions& o, std::function<int()>& run) {
   c->add_option("--field-of-view", o.field_of_view_deg, "Degrees; 90 unless given")
       ->needs(azimuth)
       ->check(CLI::Range(0.1, 179.0));
+  c->add_option("--max-distance", o.max_distance_m,
+                "Leave out groups beyond this, metres in plan; tiles beyond it are not read")
+      ->check(CLI::PositiveNumber);
   add_common(*c, o.common);
   c->callback([&] { run = [&o] { return run_cull(o); }; });
 }

@@ -149,6 +149,7 @@ struct CullOptions {
   std::string crs;
   std::optional<double> azimuth_deg;  ///< of the view's middle; none: all around
   double field_of_view_deg = 90;
+  std::optional<double> max_distance_m;
 };
 
 struct VerifyOptions {
