@@ -72,7 +72,12 @@ TiledScene tiled_scene(const SampleGrid& raster, const TiledOptions& options) {
     HiddenTogetherOptions together;
     together.group_triangles = options.group_triangles;
     const LeafGroups groups = grow_hidden_together(tin, together);
-    const TileView view = view_of_tile(scene.scheme, surfaces(scene, scene.scheme.seen_from(id)));
+    std::vector<TileId> seen = scene.scheme.seen_from(id);
+    if (options.all_detail) {
+      seen = scene.scheme.tiles(id.level);
+      std::stable_partition(seen.begin(), seen.end(), [&](const TileId& t) { return t == id; });
+    }
+    const TileView view = view_of_tile(scene.scheme, surfaces(scene, seen));
     TileOfScene tile{id, groups.count, {}, {}, view.tin.triangles.size()};
     tile.regions =
         certify_tile(view, groups.group_of_triangle, groups.count, scene.lowest_m, options.hiding);

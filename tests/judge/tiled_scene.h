@@ -20,6 +20,7 @@ struct TiledOptions {
   double max_error_m = 1;
   std::uint32_t group_triangles = 16;
   HidingOptions hiding = {};
+  bool all_detail = false;  ///< tiles see all of the finest level instead of what tiles see
 };
 
 /// One tile of the finest level with its groups.
