@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cinttypes>
 #include <cmath>
 #include <cstdio>
@@ -147,6 +148,62 @@ SampleGrid hard_terrain(std::uint64_t seed) {
       return test::bent_grid(columns, rows, 0.01, 60, [&](std::int32_t c, std::int32_t r) {
         return 900 * std::sin(0.3 * c) * std::cos(0.2 * r) + 60 * unit();
       });
+  }
+}
+
+/// Places of a surface drawn at random against the finest one.
+struct Compared {
+  double above_m = -HUGE_VAL, below_m = -HUGE_VAL;
+  int over_void = 0;
+};
+
+Compared compare_places(const Tin& tin, const TinIndex& finest, std::uint64_t seed) {
+  const TinIndex index(tin);
+  std::mt19937_64 random(seed);
+  const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
+  Compared compared;
+  for (int i = 0; i < 2000; ++i) {
+    const auto& [a, b, c] = tin.triangles[random() % tin.triangles.size()];
+    const Position &p = tin.vertices[a], &q = tin.vertices[b], &r = tin.vertices[c];
+    double s = i % 4 == 0 ? 0 : unit(), t = unit();  // some on edges
+    if (s + t > 1) s = 1 - s, t = 1 - t;
+    const double x_m = round_to_lattice(p.x_m + s * (q.x_m - p.x_m) + t * (r.x_m - p.x_m));
+    const double y_m = round_to_lattice(p.y_m + s * (q.y_m - p.y_m) + t * (r.y_m - p.y_m));
+    const auto z_m = index.ground_height_m(x_m, y_m);
+    if (!z_m) continue;  // rounded out of the surface
+    const auto ground_m = finest.ground_height_m(x_m, y_m);
+    if (!ground_m) {
+      ++compared.over_void;
+      continue;
+    }
+    compared.above_m = std::max(compared.above_m, *z_m - *ground_m);
+    compared.below_m = std::max(compared.below_m, *ground_m - *z_m);
+  }
+  return compared;
+}
+
+TEST(TileProof, OccludersLieNowhereAboveTheFinestSurfaceAndMeshesWithinTheirGaps) {
+  TiledOptions options = small_tiles();
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
+    SCOPED_TRACE("terrain " + std::to_string(seed));
+    options.tile_samples = seed % 2 == 0 ? 8 : 4;
+    const TiledScene scene = test::tiled_ground(hard_terrain(seed), options);
+    const TinIndex finest(scene.whole);
+    EXPECT_GT(scene.occluders.size(), 3U);
+    for (const auto& [id, occluder] : scene.occluders) {
+      EXPECT_EQ(check_tin(occluder.tin), std::nullopt);
+      EXPECT_TRUE(
+          std::is_sorted(occluder.sample_of_vertex.begin(), occluder.sample_of_vertex.end()));
+      const Compared compared = compare_places(occluder.tin, finest, seed);
+      EXPECT_LE(compared.above_m, 0) << name_of(id);
+      EXPECT_EQ(compared.over_void, 0) << name_of(id);
+      EXPECT_LE(measure_gap(occluder.tin, scene.whole).above_m, kGapRoundingM) << name_of(id);
+    }
+    for (const auto& [id, gap] : scene.gaps) {
+      const Compared compared = compare_places(scene.meshes.at(id).tin, finest, seed);
+      EXPECT_LE(compared.above_m, gap.above_m) << name_of(id);
+      EXPECT_LE(compared.below_m, gap.below_m) << name_of(id);
+    }
   }
 }
 

@@ -40,6 +40,7 @@ struct TiledScene {
   std::vector<TileOfScene> tiles;  ///< of the finest level, those with ground
   std::map<TileId, Mesh> meshes;   ///< of all levels
   std::map<TileId, Occluder> occluders;
+  std::map<TileId, SurfaceGap> gaps;  ///< of coarser levels, from the finest
   double lowest_m = 0;
 };
 
