@@ -19,6 +19,22 @@ SeenTile seen_mesh(const TileId& id, const Mesh& mesh) {
   return {id, &mesh.tin, mesh.sample_of_vertex};
 }
 
+/// How far a tile's mesh lies from the finest: from the next level, and what that has gathered.
+SurfaceGap gap_from_finest(const TiledScene& scene, const TileId& id) {
+  std::vector<SeenTile> finer;
+  SurfaceGap below;
+  for (const TileId& tile : scene.scheme.finer_around(id)) {
+    const Mesh& mesh = scene.meshes.at(tile);
+    if (!mesh.tin.triangles.empty()) finer.push_back(seen_mesh(tile, mesh));
+    if (const auto at = scene.gaps.find(tile); at != scene.gaps.end()) {
+      below.above_m = std::max(below.above_m, at->second.above_m);
+      below.below_m = std::max(below.below_m, at->second.below_m);
+    }
+  }
+  const SurfaceGap gap = gap_of(scene.scheme, seen_mesh(id, scene.meshes.at(id)), finer);
+  return {gap.above_m + below.above_m, gap.below_m + below.below_m};
+}
+
 /// What a tile is lowered under: meshes of the finest level, occluders of others.
 std::vector<SeenTile> surfaces(const TiledScene& scene, const std::vector<TileId>& tiles) {
   std::vector<SeenTile> found;
@@ -36,7 +52,7 @@ std::vector<SeenTile> surfaces(const TiledScene& scene, const std::vector<TileId
 }  // namespace
 
 TiledScene tiled_ground(const SampleGrid& raster, const TiledOptions& options) {
-  TiledScene scene{{raster.columns, raster.rows, options.tile_samples}, {}, {}, {}, {}, 0};
+  TiledScene scene{{raster.columns, raster.rows, options.tile_samples}, {}, {}, {}, {}, {}, 0};
   const TileScheme& scheme = scene.scheme;
   for (std::int32_t level = scheme.finest_level(); level >= 0; --level) {
     const SampleGrid grid = coarsened(raster, scheme.stride(level));
@@ -52,6 +68,7 @@ TiledScene tiled_ground(const SampleGrid& raster, const TiledOptions& options) {
       if (mesh.tin.triangles.empty()) continue;
       Occluder occluder =
           occluder_of(scheme, seen_mesh(id, mesh), surfaces(scene, scheme.finer_around(id)));
+      scene.gaps[id] = gap_from_finest(scene, id);
       if (!occluder.tin.triangles.empty()) scene.occluders.emplace(id, std::move(occluder));
     }
   }
@@ -72,7 +89,12 @@ TiledScene tiled_scene(const SampleGrid& raster, const TiledOptions& options) {
     HiddenTogetherOptions together;
     together.group_triangles = options.group_triangles;
     const LeafGroups groups = grow_hidden_together(tin, together);
-    const TileView view = view_of_tile(scene.scheme, surfaces(scene, scene.scheme.seen_from(id)));
+    std::vector<TileId> seen = scene.scheme.seen_from(id);
+    if (options.all_detail) {
+      seen = scene.scheme.tiles(id.level);
+      std::stable_partition(seen.begin(), seen.end(), [&](const TileId& t) { return t == id; });
+    }
+    const TileView view = view_of_tile(scene.scheme, surfaces(scene, seen));
     TileOfScene tile{id, groups.count, {}, {}, view.tin.triangles.size()};
     tile.regions =
         certify_tile(view, groups.group_of_triangle, groups.count, scene.lowest_m, options.hiding);

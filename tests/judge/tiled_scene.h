@@ -20,6 +20,7 @@ struct TiledOptions {
   double max_error_m = 1;
   std::uint32_t group_triangles = 16;
   HidingOptions hiding = {};
+  bool all_detail = false;  ///< tiles see all of the finest level instead of what tiles see
 };
 
 /// One tile of the finest level with its groups.
@@ -39,6 +40,7 @@ struct TiledScene {
   std::vector<TileOfScene> tiles;  ///< of the finest level, those with ground
   std::map<TileId, Mesh> meshes;   ///< of all levels
   std::map<TileId, Occluder> occluders;
+  std::map<TileId, SurfaceGap> gaps;  ///< of coarser levels, from the finest
   double lowest_m = 0;
 };
 

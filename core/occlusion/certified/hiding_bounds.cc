@@ -194,7 +194,7 @@ class Bounding {
         view_along(fan_of(options_.fans, order[static_cast<std::size_t>(begin) + i]), tin_,
                    origin_x_m_, origin_y_m_, views[i]);
         turns[i] = turns_of(views[i].fan, rings);
-        ridges[i].cross(ridge_edges_, views[i], options_.width * unit_m_);
+        ridges[i].cross(ridge_edges_, views[i], options_.width * unit_m_, looked_from(views[i]));
       });
       parallel_for(bounds_.circle.size(), [&](std::size_t group) {
         for (std::size_t i = 0; i < count; ++i)
@@ -218,6 +218,20 @@ class Bounding {
       bounds_.height_m.push_back(top_m);
       bounds_.circle.push_back(enclosing_circle(convex_hull(std::move(corners))));
     }
+  }
+
+  /// Where the groups are, in the frame of a fan.
+  RidgeRange looked_from(const FanView& view) const {
+    RidgeRange range{HUGE_VAL, HUGE_VAL, -HUGE_VAL};
+    for (const Circle& circle : bounds_.circle) {
+      const FanPlace centre =
+          place_in(view.fan, circle.x_m - origin_x_m_, circle.y_m - origin_y_m_, 0);
+      const double reach_m = circle.radius_m * (1 + 0x1p-20) + 16 * view.error_m;
+      range.low_u_m = std::min(range.low_u_m, centre.u_m - reach_m);
+      range.low_v_m = std::min(range.low_v_m, centre.v_m - reach_m);
+      range.high_v_m = std::max(range.high_v_m, centre.v_m + reach_m);
+    }
+    return range;
   }
 
   /// Sectors that cameras in a lane and ring of a fan can be in, from that of the fan's middle.
