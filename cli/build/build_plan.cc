@@ -35,6 +35,8 @@ constexpr double kTriangleShare = 0.1;  // triangles to a sample
 constexpr double kVertexShare = 0.2;
 constexpr double kBytesPerSeenVertex = 250;
 constexpr double kBytesPerGroupSample = 24;  // index, raster of groups, bounds
+constexpr double kBytesPerDrawnTriangle = 150;
+constexpr std::uint64_t kBytesOfPictures = 64U << 20;
 constexpr std::uint64_t kBytesOfProcess = 96U << 20;
 
 std::string work_file_name(const TileId& tile, const char* kind) {
@@ -150,7 +152,7 @@ class Planner {
       step.memory_bytes = mesh_bytes(TileId{});
       step.cost_s = 2 * kMeshS * samples_of(TileId{});
     } else {
-      step.memory_bytes += 64 * static_cast<std::uint64_t>(kMostPreviewTriangles);
+      step.memory_bytes = finish_bytes();
       step.cost_s = 20;
     }
     add(std::move(step));
@@ -171,6 +173,14 @@ class Planner {
     return kBytesOfProcess + static_cast<std::uint64_t>(
                                  samples_of(tile) * (kBytesPerGroupSample +
                                                      kBytesPerSeenVertex * kVertexShare * seen));
+  }
+  /// Pictures, and a tile of the groups' layer.
+  std::uint64_t finish_bytes() const {
+    const double triangles =
+        std::min(static_cast<double>(kMostPreviewTriangles),
+                 2.0 * scheme_.columns() * static_cast<double>(scheme_.rows()));
+    return kBytesOfProcess + kBytesOfPictures +
+           static_cast<std::uint64_t>(kBytesPerDrawnTriangle * triangles);
   }
   double cost_of_groups(const TileId& tile) const {
     const int fans = plan_.options.fans.value_or(HidingOptions{}.fans);
