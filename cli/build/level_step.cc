@@ -106,7 +106,7 @@ void level_of_tile(StepRun& run) {
     if (mesh.tin.triangles.empty()) return;
     run.facts = facts_of_mesh(mesh);
     run.make(tile_file_name(name_of(tile), "tin"), "tin", [&](const std::string& path) {
-      write_tin(path, mesh.tin, mesh.sample_of_vertex, Existing::kReplace);
+      write_compact_tin(path, mesh.tin, mesh.sample_of_vertex, Existing::kReplace);
     });
     const SeenTile coarse{tile, &mesh.tin, mesh.sample_of_vertex};
     FinerGround finer(run, false);

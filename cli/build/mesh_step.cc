@@ -145,7 +145,10 @@ void mesh_of_tile(StepRun& run) {
     if (plan.options.observer)  // there may be no such place: before the long work
       resolve(*plan.options.observer, plan.options.crs, *source.dem().frame, TinIndex(mesh.tin));
     run.make(tile_file_name(name, "tin"), "tin", [&](const std::string& path) {
-      write_tin(path, mesh.tin, mesh.sample_of_vertex, Existing::kReplace);
+      if (plan.has_one_tile())
+        write_tin(path, mesh.tin, mesh.sample_of_vertex, Existing::kReplace);
+      else
+        write_compact_tin(path, mesh.tin, mesh.sample_of_vertex, Existing::kReplace);
     });
   });
   run.check_sources();

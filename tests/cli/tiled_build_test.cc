@@ -67,7 +67,7 @@ std::map<std::string, std::string> files_of(const std::string& scene) {
 }
 
 constexpr char kQuick[] =
-    " --max-error 15 --fans 32 --patch 2 --group-triangles 40 --min-group-triangles 10 "
+    " --max-error 6 --fans 32 --patch 2 --group-triangles 40 --min-group-triangles 10 "
     "--tile-samples 64 ";
 
 /// One DEM and one scene of 4 x 3 tiles for all tests that only read it.
@@ -96,7 +96,7 @@ TEST_F(TiledBuild, ReportTellsTilesLevelsAndWhatRefinementSaved) {
   EXPECT_EQ(report["tiles"]["finest"], 12);
   EXPECT_EQ(report["tiles"]["levels"], 3);
   EXPECT_EQ(report["raster"]["known_samples"], report["inputs"][0]["samples"]);
-  EXPECT_LE(report["mesh"]["error_over_surface_m"], 15);
+  EXPECT_LE(report["mesh"]["error_over_surface_m"], 6);
   ASSERT_EQ(report["levels"].size(), 2U);
   for (const json& level : report["levels"]) {
     EXPECT_GT(level["triangles"], 0);
