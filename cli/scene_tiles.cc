@@ -67,14 +67,39 @@ Groups SceneTiles::read_groups(std::size_t i) {
   return scarp::read_groups(scene_.open(scene_.require(tile(i).id, "groups")));
 }
 
-Tin SceneTiles::read_ground(const ViewPlan& plan) {
-  std::vector<Tin> tins;
+std::vector<std::size_t> SceneTiles::tiles_in(const ViewPlan& plan) const {
+  std::vector<std::size_t> tiles;
   for (std::size_t i = 0; i < size(); ++i)
-    if (meets(i, plan)) tins.push_back(read_tin(i));
+    if (meets(i, plan)) tiles.push_back(i);
+  return tiles;
+}
+
+Tin SceneTiles::read_ground(const std::vector<std::size_t>& tiles) {
+  std::vector<Tin> tins;
+  for (const std::size_t i : tiles) tins.push_back(read_tin(i));
   if (tins.size() == 1) return std::move(tins.front());
   std::vector<const Tin*> parts;
   for (const Tin& tin : tins) parts.push_back(&tin);
   return weld(parts).tin;
+}
+
+TileWindow SceneTiles::window_of(const std::vector<std::size_t>& tiles) const {
+  const RasterGeometry& raster = scene_.description().raster;
+  const auto& parameters = scene_.description().parameters;
+  const auto side = parameters.find("tile_samples");
+  if (side == parameters.end() || tiles.size() == size() || tiles.empty())
+    return {0, 0, raster.columns, raster.rows, 1};
+  const TileScheme scheme(raster.columns, raster.rows,
+                          static_cast<std::int32_t>(std::get<std::int64_t>(side->second)));
+  std::int32_t left = raster.columns, above = raster.rows, right = 0, below = 0;
+  for (const std::size_t i : tiles) {
+    const TileWindow window = scheme.window(tile_id(tile(i)));
+    left = std::min(left, window.first_column);
+    above = std::min(above, window.first_row);
+    right = std::max(right, window.last_column());
+    below = std::max(below, window.last_row());
+  }
+  return {left, above, right - left + 1, below - above + 1, 1};
 }
 
 MapPoint SceneTiles::resolve(const TypedPosition& typed, const std::string& crs) {
@@ -84,7 +109,7 @@ MapPoint SceneTiles::resolve(const TypedPosition& typed, const std::string& crs)
   point.height_m = 0;
   // The place in the plane depends a little on the height: see ground_height_m.
   constexpr double kLeanM = 100;
-  const Tin ground = read_ground({placer.place(point), kLeanM, {}});
+  const Tin ground = read_ground(tiles_in({placer.place(point), kLeanM, {}}));
   return scarp::resolve(typed, crs, frame_, TinIndex(ground));
 }
 

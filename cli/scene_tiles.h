@@ -41,8 +41,13 @@ class SceneTiles {
   Tin read_tin(std::size_t i);
   /// Its groups.
   Groups read_groups(std::size_t i);
-  /// The tiles that meet a plan as one surface, maybe none.
-  Tin read_ground(const ViewPlan& plan);
+  /// The tiles that meet a plan.
+  std::vector<std::size_t> tiles_in(const ViewPlan& plan) const;
+  /// Tiles as one surface.
+  Tin read_ground(const std::vector<std::size_t>& tiles);
+  /// The rectangle of the raster that holds the samples of tiles; all of it where the scene does
+  /// not tell how large tiles are.
+  TileWindow window_of(const std::vector<std::size_t>& tiles) const;
 
   /// How many different ones were read so far.
   std::size_t tiles_read() const { return read_.size(); }

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -164,6 +165,50 @@ TEST_F(TiledBuild, CullReadsTheTilesThatItNeeds) {
     EXPECT_LT((*part)["visible_groups"].size(), groups.size());
     for (const int group : (*part)["visible_groups"]) EXPECT_TRUE(groups.contains(group));
   }
+}
+
+/// Values of a raster by the map place of its samples.
+std::map<std::pair<long, long>, int> values_by_place(const std::string& path) {
+  GDALDataset* raster = GDALDataset::Open(path.c_str());
+  const int columns = raster->GetRasterXSize(), rows = raster->GetRasterYSize();
+  double transform[6];
+  raster->GetGeoTransform(transform);
+  std::vector<std::uint8_t> values(static_cast<std::size_t>(columns) *
+                                   static_cast<std::size_t>(rows));
+  EXPECT_EQ(raster->GetRasterBand(1)->RasterIO(GF_Read, 0, 0, columns, rows, values.data(), columns,
+                                               rows, GDT_Byte, 0, 0),
+            CE_None);
+  GDALClose(raster);
+  std::map<std::pair<long, long>, int> by_place;
+  for (int r = 0; r < rows; ++r)
+    for (int c = 0; c < columns; ++c)
+      by_place[{std::lround(transform[0] + (c + 0.5) * transform[1]),
+                std::lround(transform[3] + (r + 0.5) * transform[5])}] =
+          values[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns) +
+                 static_cast<std::size_t>(c)];
+  return by_place;
+}
+
+TEST_F(TiledBuild, ViewshedReadsTheTilesThatItReaches) {
+  const std::string ask = "$SCARP viewshed " + scene_ + " --observer=401900,5198200,40 --json";
+  const std::string near_file = folder_->path("near.tif"), all_file = folder_->path("all.tif");
+  const RunResult near_run = run_scarp(ask + " --max-distance 600 -o " + near_file);
+  ASSERT_EQ(near_run.exit_code, 0) << near_run.errors;
+  const json near = json::parse(near_run.output);
+  const json all = json::parse(run_scarp(ask + " -o " + all_file).output);
+  EXPECT_EQ(all["tiles_read"], 12);
+  EXPECT_LE(near["tiles_read"], 4);
+  EXPECT_LT(near["columns"], kColumns);
+  const auto whole = values_by_place(all_file);
+  int visible = 0;
+  for (const auto& [place, value] : values_by_place(near_file)) {
+    const double dx = static_cast<double>(place.first - 401'900);
+    const double dy = static_cast<double>(place.second - 5'198'200);
+    if (std::hypot(dx, dy) > 590) continue;  // beyond the distance nothing is seen
+    EXPECT_EQ(value, whole.at(place)) << place.first << " " << place.second;
+    visible += value;
+  }
+  EXPECT_GT(visible, 100);
 }
 
 TEST_F(TiledBuild, StepsOfAPlanMakeTheSameSceneInAnyOrderThatItAllows) {
