@@ -153,7 +153,7 @@ class Bench {
     TileView view;
     const double assembled =
         cpu_seconds([&] { view = view_of_tile(scheme_, seen(scheme_.seen_from(id))); });
-    const double took = seconds(
+    const double took = cpu_seconds(
         [&] { certify_tile(view, groups.group_of_triangle, groups.count, lowest_m, hiding); });
     fmt::print(
         "certify  tile {}, {} fans: {} triangles alone {:.2f} s; with a view of {} triangles, "
