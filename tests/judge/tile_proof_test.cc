@@ -262,14 +262,14 @@ Counts look_from_above(const TiledScene& scene, double above_m, int eyes) {
 TEST(TileProof, RealGroundInTilesIsCulledNearlyAsInOne) {
   SCARP_SHARED_OR_SKIP(path, "projected/bigtujunga_srtm30m_utm11.tif");
   const bool is_full = std::getenv("SCARP_PROVE_TILES") != nullptr;
-  const std::int32_t samples = is_full ? 513 : 129;
+  const std::int32_t samples = is_full ? 385 : 129;
   const SampleGrid raster = test::dem_window(path, 200, 200, samples, samples, 30);
   ASSERT_EQ(raster.columns, samples);
   TiledOptions options = small_tiles();
   options.max_error_m = 5;
-  options.tile_samples = is_full ? 64 : 32;
-  options.group_triangles = 32;
-  if (is_full) options.hiding = {};
+  options.tile_samples = is_full ? 128 : 32;
+  options.group_triangles = is_full ? 128 : 32;
+  if (is_full) options.hiding = {.fans = 128};
   const TiledScene tiles = test::tiled_scene(raster, options);
   options.all_detail = true;
   const TiledScene all_detail = test::tiled_scene(raster, options);
@@ -280,9 +280,9 @@ TEST(TileProof, RealGroundInTilesIsCulledNearlyAsInOne) {
   std::printf("%zu triangles in %zu tiles, %zu in one\n", tiles.whole.triangles.size(),
               tiles.tiles.size(), one.whole.triangles.size());
   for (const double above_m : {2.0, 50.0, 300.0}) {
-    const Counts in_tiles = look_from_above(tiles, above_m, is_full ? 40 : 12);
-    const Counts in_detail = look_from_above(all_detail, above_m, is_full ? 40 : 12);
-    const Counts in_one = look_from_above(one, above_m, is_full ? 40 : 12);
+    const Counts in_tiles = look_from_above(tiles, above_m, is_full ? 24 : 12);
+    const Counts in_detail = look_from_above(all_detail, above_m, is_full ? 24 : 12);
+    const Counts in_one = look_from_above(one, above_m, is_full ? 24 : 12);
     const auto share = [](const Counts& counts) {
       return double(counts.culled_triangles) / double(counts.hidden_triangles);
     };
