@@ -190,7 +190,11 @@ TEST(TileProof, OccludersLieNowhereAboveTheFinestSurfaceAndMeshesWithinTheirGaps
     const TiledScene scene = test::tiled_ground(hard_terrain(seed), options);
     const TinIndex finest(scene.whole);
     EXPECT_GT(scene.occluders.size(), 3U);
+    std::size_t kept = 0, all = 0;
+    for (const auto& [id, mesh] : scene.meshes)
+      if (id.level < scene.scheme.finest_level()) all += mesh.tin.triangles.size();
     for (const auto& [id, occluder] : scene.occluders) {
+      kept += occluder.tin.triangles.size();
       EXPECT_EQ(check_tin(occluder.tin), std::nullopt);
       EXPECT_TRUE(
           std::is_sorted(occluder.sample_of_vertex.begin(), occluder.sample_of_vertex.end()));
@@ -199,6 +203,8 @@ TEST(TileProof, OccludersLieNowhereAboveTheFinestSurfaceAndMeshesWithinTheirGaps
       EXPECT_EQ(compared.over_void, 0) << name_of(id);
       EXPECT_LE(measure_gap(occluder.tin, scene.whole).above_m, kGapRoundingM) << name_of(id);
     }
+    // What is left out lies along borders of the ground that bend.
+    EXPECT_GE(double(kept), (seed % 6 == 5 ? 0.85 : 1) * double(all));
     for (const auto& [id, gap] : scene.gaps) {
       const Compared compared = compare_places(scene.meshes.at(id).tin, finest, seed);
       EXPECT_LE(compared.above_m, gap.above_m) << name_of(id);
