@@ -122,7 +122,8 @@ TEST(TileView, RegionsAreTheSameForAnyNumberOfThreads) {
   const std::vector<SeenTile> seen = scene.seen_from(id);
   ASSERT_TRUE(seen.front().id == id);
   const TileView view = view_of_tile(scene.scheme, seen);
-  const LeafGroups groups = group_by_squares(*seen.front().tin, 16);
+  // Large groups, for which a scene of one tile would have finer rings.
+  const LeafGroups groups = group_by_squares(*seen.front().tin, 128);
   const auto certified = [&] {
     return certify_tile(view, groups.group_of_triangle, groups.count, -100, few_fans());
   };
