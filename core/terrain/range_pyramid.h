@@ -26,9 +26,9 @@ HeightRange united(const HeightRange& a, const HeightRange& b);
 /// Cells of a tile's level to a block of its finest ranges; of smaller tiles, all.
 inline constexpr std::int32_t kRangeBlockCells = 16;
 
-/// Ranges of heights over square blocks of a tile: its row of the minimum/maximum pyramid of the
-/// scene. Blocks hold all ground of the raster in their square, also what coarse tiles leave to
-/// finer ones, so the tiles of a level cover the raster.
+/// Ranges of heights over square blocks of a tile: its part of the minimum/maximum pyramid of the
+/// scene. Blocks hold all ground of the raster in the tile's square, also what coarser meshes leave
+/// to finer ones; only what lies in no tile of a level (TileScheme) is in finer ranges alone.
 struct TileRanges {
   std::int32_t block_cells = 0;  ///< of the raster, along a block's side
   std::int32_t columns = 0;      ///< of blocks

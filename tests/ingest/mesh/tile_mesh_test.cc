@@ -6,8 +6,10 @@
 #include <cmath>
 #include <random>
 
+#include "ingest/dem/dem.h"
 #include "tests/ingest/mesh/grids.h"
 #include "tests/ingest/mesh/tiled.h"
+#include "tests/support/shared_data.h"
 
 namespace scarp {
 namespace {
@@ -179,6 +181,23 @@ TEST(TileMesh, EdgesThatBendAreCutHoweverLooseTheError) {
     }
     // A chord strays by a quarter of bend times length squared, in cells.
     EXPECT_GT(least_height_in_bends(raster, level.whole.tin), 0.25);
+  }
+}
+
+TEST(TileMesh, RealMountainsOfAllLevelsAreOneSurface) {
+  SCARP_SHARED_OR_SKIP(path, "geographic/N27E086_everest_srtm3_voids.tif");
+  // With voids, and a frame in which grid lines bend.
+  const Dem dem = read_dem({path}, {}, {});
+  const SampleGrid raster = test::part_of(place_samples(dem), {0, 0, 700, 500, 1});
+  const TileScheme scheme(raster.columns, raster.rows, 128);
+  for (std::int32_t level = 0; level <= scheme.finest_level(); ++level) {
+    SCOPED_TRACE("level " + std::to_string(level));
+    const double max_error_m = 20 * scheme.stride(level);
+    const TiledLevel made = mesh_level(raster, scheme, level, within(max_error_m));
+    expect_sound(made, 128, max_error_m, MeshBound::kSurface);
+    if (level < scheme.finest_level()) continue;
+    const Mesh whole = mesh_samples(raster, within(max_error_m), {});
+    EXPECT_LT(double(made.whole.tin.triangles.size()), 1.03 * double(whole.tin.triangles.size()));
   }
 }
 
