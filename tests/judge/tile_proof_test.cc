@@ -112,7 +112,7 @@ TiledOptions small_tiles() {
   options.tile_samples = 8;
   options.max_error_m = 2;
   options.group_triangles = 16;
-  options.hiding.fans = 32;
+  options.hiding.fans = 48;
   options.hiding.sectors = 32;
   return options;
 }
@@ -127,8 +127,8 @@ std::uint64_t scenes_asked_for(std::uint64_t usual) {
 SampleGrid hard_terrain(std::uint64_t seed) {
   std::mt19937_64 random(seed);
   const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
-  const auto columns = static_cast<std::int32_t>(26 + random() % 12);
-  const auto rows = static_cast<std::int32_t>(26 + random() % 12);
+  const auto columns = static_cast<std::int32_t>(28 + random() % 16);
+  const auto rows = static_cast<std::int32_t>(28 + random() % 16);
   switch (seed % 6) {
     case 0:
       return test::random_hills(columns, rows, 10, seed, 150, 0.01);
@@ -239,7 +239,7 @@ TEST(TileProof, NothingIsVisibleFromJustInsideTheBoundariesOfATilesRegions) {
     test::BoundarySearch search;
     search.seed = seed + 1;
     search.starts = 2;
-    search.steps = 4;
+    search.steps = 6;
     EXPECT_GT(prove_boundaries(scene, search), 50U);
     if (testing::Test::HasFailure()) break;
   }
