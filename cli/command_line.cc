@@ -380,6 +380,38 @@ void add_compare(CLI::App& app, CompareOptions& o, std::function<int()>& run) {
   c->callback([&] { run = [&o] { return run_compare(o); }; });
 }
 
+void add_fly(CLI::App& app, FlyOptions& o, std::function<int()>& run) {
+  CLI::App* c = app.add_subcommand("fly", "Fly a path with every culling method and compare them");
+  c->footer(
+      "Example:\n  scarp fly alps.scene --route walk -o flight\n"
+      "Writes flight.html (charts and pictures), frames.csv and path.csv into the folder.");
+  c->add_option("scene", o.scene, "A scene")->required();
+  c->add_option("-o,--output", o.output, "A new folder")->required();
+  auto* path = c->add_option("--path", o.path_file,
+                             "A CSV file with a camera a line: x,y,height_m,azimuth_deg,pitch_deg");
+  c->add_option("--route", o.route,
+                "Find a path instead: walk or drive at 2 m along a valley's floor, "
+                "helicopter at 100 m, airliner at 10 km; walk unless given")
+      ->check(CLI::IsMember({"walk", "drive", "helicopter", "airliner"}))
+      ->excludes(path);
+  c->add_option("--frames", o.frames, "Frames of a path that is found; 120 unless given")
+      ->check(CLI::Range(1, 1'000'000))
+      ->excludes(path);
+  c->add_option("--seed", o.seed, "Where such a path begins; 1 unless given")->excludes(path);
+  c->add_option("--methods", o.methods, "Some of them only, separated by commas")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"frustum", "thesis", "certified", "cells", "hzb", "mask", "hom",
+                             "hom-0.7", "lod-query", "multi-frame", "stop-and-wait"}));
+  c->add_option("--width", o.width_px, "Of the pictures, pixels, 16:9; 640 unless given")
+      ->check(CLI::Range(16, 8192));
+  c->add_option("--field-of-view", o.field_of_view_deg, "Vertical, degrees; 45 unless given")
+      ->check(CLI::Range(1.0, 120.0));
+  c->add_option("--pictures", o.pictures, "Frames that are kept as pictures; 2 unless given")
+      ->check(CLI::Range(0, 1000));
+  add_common(*c, o.common);
+  c->callback([&] { run = [&o] { return run_fly(o); }; });
+}
+
 void add_preview(CLI::App& app, PreviewCommandOptions& o, std::function<int()>& run) {
   CLI::App* c = app.add_subcommand("preview", "Draw a scene as a picture");
   c->footer(
@@ -430,6 +462,7 @@ int run_command_line(int argc, char** argv) {
   CullOptions cull;
   VerifyOptions verify;
   CompareOptions compare;
+  FlyOptions fly;
   PreviewCommandOptions preview;
   ViewshedOptions viewshed;
   SightOptions sight;
@@ -440,6 +473,7 @@ int run_command_line(int argc, char** argv) {
   add_cull(app, cull, run);
   add_verify(app, verify, run);
   add_compare(app, compare, run);
+  add_fly(app, fly, run);
   add_preview(app, preview, run);
   add_viewshed(app, viewshed, run);
   add_sight(app, sight, run);
@@ -456,8 +490,8 @@ int run_command_line(int argc, char** argv) {
   }
   try {
     for (CommonOptions* common :
-         {&build.common, &cull.common, &verify.common, &compare.common, &preview.common,
-          &viewshed.common, &sight.common, &horizon.common, &check.common}) {
+         {&build.common, &cull.common, &verify.common, &compare.common, &fly.common,
+          &preview.common, &viewshed.common, &sight.common, &horizon.common, &check.common}) {
       if (!common->memory_budget_bytes) common->memory_budget_bytes = machine_memory_bytes() / 2;
       if (common->threads) set_thread_count(common->threads);
     }

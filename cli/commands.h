@@ -10,6 +10,7 @@ int run_build(const BuildOptions& options);
 int run_cull(const CullOptions& options);
 int run_verify(const VerifyOptions& options);
 int run_compare(const CompareOptions& options);
+int run_fly(const FlyOptions& options);
 int run_preview(const PreviewCommandOptions& options);
 int run_viewshed(const ViewshedOptions& options);
 int run_sight(const SightOptions& options);

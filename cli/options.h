@@ -170,6 +170,20 @@ struct CompareOptions {
   double limit_s = 300;
 };
 
+struct FlyOptions {
+  CommonOptions common;
+  std::string scene;
+  std::string output;     ///< folder
+  std::string path_file;  ///< empty: a path is found
+  std::string route = "walk";
+  int frames = 120;
+  std::uint64_t seed = 1;
+  std::vector<std::string> methods;  ///< empty: all that the scene has
+  int width_px = 640;
+  double field_of_view_deg = 45;  ///< vertical
+  int pictures = 2;               ///< frames that are kept as pictures
+};
+
 struct PreviewCommandOptions {
   CommonOptions common;
   std::string scene;

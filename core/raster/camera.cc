@@ -133,6 +133,19 @@ Projection look_at(const View& view, int width_px, int height_px) {
   return projection;
 }
 
+Position ray_through(const Projection& projection, double x, double y) {
+  // The first two rows are axes times a scale, whose square is their length's.
+  const auto row = [&](std::size_t r) {
+    return Position{projection.rows[4 * r], projection.rows[4 * r + 1], projection.rows[4 * r + 2]};
+  };
+  const Position right = row(0), up = row(1), forward = row(3);
+  const double along_right = x / dot(right, right), along_up = y / dot(up, up);
+  const auto sum = [&](double Position::*c) {
+    return forward.*c + along_right * right.*c + along_up * up.*c;
+  };
+  return {sum(&Position::x_m), sum(&Position::y_m), sum(&Position::z_m)};
+}
+
 Projection ortho_from_above(const Bounds& bounds, int width_px, int height_px, double margin_px) {
   assert(width_px > 2 * margin_px && height_px > 2 * margin_px);
   const double extent_x_m = bounds.high.x_m - bounds.low.x_m;

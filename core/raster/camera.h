@@ -47,6 +47,10 @@ Position exaggerated(const View& view, const Position& p);
 /// Requires (asserted): eye and target apart, positive sizes and near_m, field of view in (0, pi).
 Projection look_at(const View& view, int width_px, int height_px);
 
+/// The direction of the ray that a perspective projection puts at (x, y) of the screen, both in
+/// [-1, 1]; its part along the view is 1.
+Position ray_through(const Projection& projection, double x, double y);
+
 /// Parallel projection straight down, north up: the whole of `bounds` centred in the picture, with
 /// square pixels and `margin_px` left free at the narrower side; the highest point has depth 1,
 /// the lowest 0. Requires (asserted) a picture larger than its margins.

@@ -1,0 +1,229 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.h"
+#include "cli/fly/flight.h"
+#include "cli/fly/flight_page.h"
+#include "cli/fly/flight_path.h"
+#include "cli/fly/frame_picture.h"
+#include "cli/loaded_scene.h"
+#include "cli/progress_bar.h"
+#include "cli/scene_culling.h"
+#include "core/culling/box_tree.h"
+#include "core/culling/cell_culling.h"
+#include "core/culling/image_culling.h"
+#include "core/culling/mask_culling.h"
+#include "core/culling/query_culling.h"
+#include "core/error/error.h"
+#include "tiles/layers/png_image.h"
+#include "tiles/store/part_folder.h"
+
+namespace scarp {
+namespace {
+
+/// Everything in the picture: what a scene without culling draws.
+class EverythingInView : public CullingMethod {
+ public:
+  explicit EverythingInView(std::uint32_t groups) {
+    for (GroupIndex g = 0; g < groups; ++g) all_.visible_groups.push_back(g);
+  }
+  std::string_view name() const override { return "frustum"; }
+  CullingAnswer visible(const Camera&) override { return all_; }
+
+ private:
+  CullingAnswer all_;
+};
+
+constexpr char kPageName[] = "flight.html";
+/// Of the triangles, in the two levels that objects are counted with.
+constexpr double kCoarseShares[] = {0.25, 0.0625};
+
+constexpr float kSmallGapOpacity = 0.7F;
+
+/// What methods are made from; some of them share it.
+struct Prepared {
+  GroupBatches batches;
+  BoxTree tree;
+  double coarse_s = 0;
+  CoarseBatches coarse;
+
+  explicit Prepared(const LoadedScene& scene)
+      : batches(scene.tin, scene.groups), tree(batches), coarse(timed_coarse()) {}
+
+ private:
+  CoarseBatches timed_coarse() {
+    const auto begun = std::chrono::steady_clock::now();
+    CoarseBatches made(batches, {std::begin(kCoarseShares), std::end(kCoarseShares)});
+    coarse_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+    return made;
+  }
+};
+
+/// Where cells are made: the ground and what is above it, as far as the highest is above the
+/// lowest.
+Bounds airspace(const Tin& tin) {
+  Bounds space = bounds_of(tin.vertices);
+  space.high.z_m += std::max(1.0, space.high.z_m - space.low.z_m);
+  return space;
+}
+
+/// Cells are divided down to a quarter of the mean group's radius.
+double least_cell_m(const CertifiedRegions& regions) {
+  double sum_m = 0;
+  for (const CertifiedGroup& group : regions.groups) sum_m += static_cast<double>(group.radius_m);
+  return sum_m / static_cast<double>(regions.groups.size()) / 4;
+}
+
+std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& prepared,
+                                     const std::vector<std::string>& wanted) {
+  const GroupBatches& batches = prepared.batches;
+  std::vector<Contender> all;
+  const auto add = [&](const std::string& label, bool is_conservative, double prepare_s,
+                       std::uint64_t bytes, auto make) {
+    if (wanted.empty() || std::find(wanted.begin(), wanted.end(), label) != wanted.end())
+      all.push_back({label, is_conservative, prepare_s, bytes, make()});
+  };
+  add("frustum", true, 0, 0,
+      [&] { return std::make_unique<EverythingInView>(scene.groups.leaf_count); });
+  for (const char* method : {"thesis", "certified"}) {
+    const bool is_certified = std::string(method) == "certified";
+    if (is_certified ? scene.groups.has_certified() : has_horizons(scene))
+      add(method, is_certified, NAN, region_bytes(scene.groups, method),
+          [&] { return culling_method(scene, method); });
+  }
+  add("hzb", true, 0, 0, [&] { return std::make_unique<HzbCulling>(scene.tin, batches); });
+  add("mask", false, 0, 0,
+      [&] { return std::make_unique<MaskCulling>(scene.tin, batches, prepared.tree); });
+  if (scene.groups.has_certified())
+    add("cells", true, 0, 0, [&] {
+      return std::make_unique<CellCulling>(scene.groups.certified, airspace(scene.tin),
+                                           least_cell_m(scene.groups.certified));
+    });
+  ImageCullingOptions hom;
+  add("hom", false, 0, 0, [&] { return std::make_unique<HomCulling>(batches, hom); });
+  hom.opacity = kSmallGapOpacity;
+  add("hom-0.7", false, 0, 0, [&] { return std::make_unique<HomCulling>(batches, hom); });
+  for (const QueryUse use : {QueryUse::kSameFrame, QueryUse::kNextFrame})
+    add(use == QueryUse::kSameFrame ? "lod-query" : "multi-frame", false, prepared.coarse_s,
+        prepared.coarse.bytes(),
+        [&] { return std::make_unique<QueryCulling>(batches, prepared.coarse, use); });
+  add("stop-and-wait", false, 0, 0, [&] { return std::make_unique<StopAndWaitCulling>(batches); });
+  for (const std::string& name : wanted)
+    if (std::none_of(all.begin(), all.end(), [&](const Contender& c) { return c.label == name; }))
+      throw Error(ErrorCode::kInput,
+                  fmt::format("--methods {}: the scene '{}' was built without it; build with "
+                              "--horizon both, or leave it out",
+                              name, scene.scene.path()));
+  return all;
+}
+
+Route route_of(const std::string& name) {
+  if (name == "walk") return Route::kWalk;
+  if (name == "drive") return Route::kDrive;
+  return name == "helicopter" ? Route::kHelicopter : Route::kAirliner;
+}
+
+/// The frames that are kept as pictures: evenly spread.
+bool is_pictured(std::size_t frame, std::size_t frames, int pictures) {
+  const auto at = [&](std::size_t f) { return f * static_cast<std::size_t>(pictures) / frames; };
+  return pictures > 0 && (frame == 0 || at(frame) != at(frame - 1));
+}
+
+nlohmann::json json_of(const Flight& flight, const std::vector<Contender>& contenders) {
+  nlohmann::json methods = nlohmann::json::array();
+  for (std::size_t c = 0; c < contenders.size(); ++c) {
+    const FlightSum sum = sum_of(flight, c);
+    methods.push_back({{"method", contenders[c].label},
+                       {"claims_no_wrong_pixel", contenders[c].is_conservative},
+                       {"drawn", sum.drawn},
+                       {"in_view", sum.in_view},
+                       {"visible", sum.visible},
+                       {"in_visible_groups", sum.in_visible_groups},
+                       {"find_ms", sum.find_ms},
+                       {"draw_ms", sum.draw_ms},
+                       {"wrong_px", sum.wrong_px},
+                       {"missed_groups", sum.missed_groups},
+                       {"bytes", contenders[c].bytes}});
+  }
+  return {{"frames", flight.truth.size()}, {"methods", methods}};
+}
+
+void print_table(const Flight& flight, const std::vector<Contender>& contenders) {
+  fmt::print("{:<10} {:>10} {:>9} {:>16} {:>9} {:>9} {:>13} {:>13}\n", "method", "drawn", "of view",
+             "of visible groups", "find, ms", "draw, ms", "wrong pixels", "groups missed");
+  for (std::size_t c = 0; c < contenders.size(); ++c) {
+    const FlightSum sum = sum_of(flight, c);
+    std::uint64_t wrong_px = 0;
+    for (const std::uint64_t wrong : sum.wrong_px) wrong_px += wrong;
+    fmt::print("{:<10} {:>10.0f} {:>7.1f} % {:>16.2f}x {:>9.3f} {:>9.2f} {:>13} {:>13}\n",
+               contenders[c].label, sum.drawn, 100 * sum.drawn / std::max(1.0, sum.in_view),
+               sum.drawn / std::max(1.0, sum.in_visible_groups), sum.find_ms, sum.draw_ms, wrong_px,
+               sum.missed_groups);
+  }
+  fmt::print(
+      "Drawn: triangles a frame, also as a share of those in view and as a multiple of those in "
+      "groups that are seen. Wrong pixels: of all frames and sizes.\n");
+}
+
+}  // namespace
+
+int run_fly(const FlyOptions& options) {
+  const LoadedScene scene(options.scene);
+  PartFolder folder(options.output, kPageName,
+                    options.common.overwrite ? Existing::kReplace : Existing::kRefuse);
+  const std::vector<Waypoint> path =
+      options.path_file.empty()
+          ? find_path(scene, route_of(options.route), options.frames, options.seed)
+          : read_path(options.path_file);
+  const Prepared prepared(scene);
+  std::vector<Contender> contenders = contenders_of(scene, prepared, options.methods);
+
+  Lens lens;
+  lens.width_px = options.width_px;
+  lens.height_px = std::max(1, options.width_px * 9 / 16);
+  lens.vertical_field_of_view_deg = options.field_of_view_deg;
+  const GeoFrame::Placer placer(scene.frame);
+  std::vector<Shot> shots;
+  for (const Waypoint& waypoint : path) shots.push_back(shot_at(placer, waypoint, lens));
+
+  std::vector<std::pair<std::string, std::string>> pictures;
+  ProgressBar bar(!options.common.json);
+  const Flight flight = fly(
+      prepared.batches, shots, contenders,
+      [&](std::size_t frame, std::size_t contender, const Target& whole, const Target& drawn) {
+        if (!is_pictured(frame, shots.size(), options.pictures)) return;
+        const Picture picture = frame_picture(scene.tin, scene.groups, whole, drawn);
+        const std::string name = fmt::format("frame-{}-{}.png", frame, contenders[contender].label);
+        write_png(folder.path_for(name), picture.width_px, picture.height_px, picture.rgb,
+                  Existing::kRefuse);
+        pictures.emplace_back(
+            name, fmt::format("Frame {}, {}: groups by colour, wrong pixels in red", frame,
+                              contenders[contender].label));
+      },
+      bar.stage("fly"));
+  bar.clear();
+  const std::string way = options.path_file.empty()
+                              ? fmt::format("{}, seed {}", options.route, options.seed)
+                              : std::filesystem::path(options.path_file).filename().string();
+  folder.write("path.csv", to_csv(path));
+  folder.write("frames.csv", flight_csv(flight, contenders));
+  folder.write(kPageName,
+               flight_page(flight, contenders,
+                           fmt::format("{} over {}: {} frames of {} x {} pixels", way,
+                                       std::filesystem::path(options.scene).filename().string(),
+                                       shots.size(), lens.width_px, lens.height_px),
+                           pictures));
+  folder.commit();
+  if (options.common.json)
+    fmt::print("{}\n", json_of(flight, contenders).dump(2));
+  else
+    print_table(flight, contenders);
+  return 0;
+}
+
+}  // namespace scarp

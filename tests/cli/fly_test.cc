@@ -1,0 +1,129 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "tests/support/run_scarp.h"
+#include "tests/support/temp_folder.h"
+
+namespace scarp {
+namespace {
+
+using nlohmann::json;
+using test::run_scarp;
+using test::RunResult;
+
+std::string read_text(const std::string& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+class FlyCommand : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new test::TempFolder;
+    std::ofstream file(folder_->path("hills.asc"));
+    file << "ncols 40\nnrows 40\nxllcorner 5000\nyllcorner 0\ncellsize 100\n";
+    for (int r = 0; r < 40; ++r, file << '\n')
+      for (int c = 0; c < 40; ++c)
+        file << std::round(400 + 250 * std::sin(0.5 * c + 0.2 * r) + 60 * std::cos(0.7 * r)) << ' ';
+    file.close();
+    scene_ = folder_->path("hills.scene");
+    const RunResult built = run_scarp(
+        "$SCARP build " + folder_->path("hills.asc") + " -o " + scene_ +
+        " --max-error 5 --group-triangles 24 --min-group-triangles 6 --fans 32 --horizon both");
+    ASSERT_EQ(built.exit_code, 0) << built.errors;
+  }
+  static void TearDownTestSuite() { delete folder_; }
+
+  static inline test::TempFolder* folder_ = nullptr;
+  static inline std::string scene_;
+};
+
+TEST_F(FlyCommand, MethodsThatClaimItShowNoWrongPixelAndLeaveSomethingOut) {
+  for (const char* route : {"walk", "helicopter"}) {
+    const RunResult run = run_scarp("$SCARP fly " + scene_ + " -o " + folder_->path(route) +
+                                    " --route " + route + " --frames 12 --width 160 --json");
+    ASSERT_EQ(run.exit_code, 0) << run.errors;
+    const json result = json::parse(run.output);
+    std::set<std::string> methods;
+    double all = 0;
+    for (const json& method : result["methods"]) {
+      const std::string name = method["method"];
+      methods.insert(name);
+      if (name == "frustum") all = method["drawn"];
+      if (name != "frustum") {
+        EXPECT_LT(method["drawn"], all) << name;
+      }
+      if (!method["claims_no_wrong_pixel"].get<bool>()) continue;
+      EXPECT_EQ(method["wrong_px"], json::array({0, 0})) << name;
+      EXPECT_EQ(method["missed_groups"], 0) << name;
+    }
+    EXPECT_EQ(methods, (std::set<std::string>{"frustum", "thesis", "certified", "cells", "hzb",
+                                              "mask", "hom", "hom-0.7", "lod-query", "multi-frame",
+                                              "stop-and-wait"}));
+  }
+}
+
+TEST_F(FlyCommand, WritesAPathThatRepeatsTheFlight) {
+  const std::string first = folder_->path("first"), again = folder_->path("again");
+  ASSERT_EQ(run_scarp("$SCARP fly " + scene_ + " -o " + first +
+                      " --frames 5 --seed 3 --width 64 --methods certified")
+                .exit_code,
+            0);
+  ASSERT_EQ(run_scarp("$SCARP fly " + scene_ + " -o " + again + " --path " + first +
+                      "/path.csv --width 64 --methods certified")
+                .exit_code,
+            0);
+  EXPECT_EQ(read_text(first + "/path.csv"), read_text(again + "/path.csv"));
+  const std::string page = read_text(first + "/flight.html");
+  EXPECT_NE(page.find("<svg"), std::string::npos);
+  EXPECT_EQ(page.find("http://"), page.find("http://www.w3.org/2000/svg")) << "no network";
+  EXPECT_TRUE(std::filesystem::exists(first + "/frame-0-certified.png"));
+  EXPECT_TRUE(std::filesystem::exists(first + "/frames.csv"));
+}
+
+TEST_F(FlyCommand, RefusesInOneLineAndLeavesNothing) {
+  std::ofstream(folder_->path("bad.csv")) << "x,y,height_m,azimuth_deg,pitch_deg\n1,2,3,4\n";
+  std::ofstream(folder_->path("empty.csv")) << "x,y,height_m,azimuth_deg,pitch_deg\n";
+  std::ofstream(folder_->path("other.csv")) << "a,b\n1,2\n";
+  const struct {
+    std::string options, found;
+  } cases[] = {{"--path " + folder_->path("bad.csv"), "line 2: '1,2,3,4'"},
+               {"--path " + folder_->path("empty.csv"), "no frame"},
+               {"--path " + folder_->path("other.csv"), "begins with 'a,b'"},
+               {"--path " + folder_->path("none.csv"), "cannot be read"}};
+  for (const auto& c : cases) {
+    const RunResult run =
+        run_scarp("$SCARP fly " + scene_ + " -o " + folder_->path("never") + " " + c.options);
+    EXPECT_EQ(run.exit_code, 1);
+    EXPECT_NE(run.errors.find(c.found), std::string::npos) << run.errors;
+    EXPECT_EQ(std::count(run.errors.begin(), run.errors.end(), '\n'), 1) << run.errors;
+  }
+  for (const auto& entry : std::filesystem::directory_iterator(folder_->folder()))
+    EXPECT_EQ(entry.path().filename().string().find("never"), std::string::npos) << entry.path();
+}
+
+TEST_F(FlyCommand, ReplacesAnEarlierFlightAndNothingElse) {
+  const std::string out = folder_->path("replaced");
+  const std::string fly = "$SCARP fly " + scene_ + " -o " + out +
+                          " --frames 2 --width 64 --methods frustum --overwrite";
+  ASSERT_EQ(run_scarp(fly).exit_code, 0);
+  EXPECT_EQ(run_scarp(fly).exit_code, 0);
+  const std::string work = folder_->path("work");
+  std::filesystem::create_directory(work);
+  std::ofstream(work + "/thesis.txt") << "years of work";
+  const RunResult run = run_scarp("$SCARP fly " + scene_ + " -o " + work + " --overwrite");
+  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_NE(run.errors.find("earlier results"), std::string::npos) << run.errors;
+  EXPECT_EQ(read_text(work + "/thesis.txt"), "years of work");
+}
+
+}  // namespace
+}  // namespace scarp

@@ -1,0 +1,131 @@
+#include "core/culling/image_culling.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "core/occlusion/squares.h"
+#include "core/raster/rasterise.h"
+#include "tests/support/terrain.h"
+
+namespace scarp {
+namespace {
+
+struct Scene {
+  Tin tin;
+  Groups groups;
+};
+
+Scene hills(std::uint32_t seed) {
+  Scene scene{test::triangulated(test::random_hills(40, 40, 10, seed, 120, 0.01), seed), {}};
+  const LeafGroups leaves = group_by_squares(scene.tin, 24);
+  scene.groups.group_of_triangle = leaves.group_of_triangle;
+  scene.groups.leaf_count = leaves.count;
+  return scene;
+}
+
+Shot random_shot(const Tin& tin, std::mt19937& random) {
+  const auto unit = [&] { return std::uniform_real_distribution<double>(0, 1)(random); };
+  const Position& under = tin.vertices[random() % tin.vertices.size()];
+  Shot shot;
+  shot.width_px = 160;
+  shot.height_px = 90;
+  shot.view.eye = {under.x_m, under.y_m, under.z_m + 2 + 40 * unit() * unit()};
+  const double turn = 6.28 * unit();
+  shot.view.target = {shot.view.eye.x_m + std::cos(turn), shot.view.eye.y_m + std::sin(turn),
+                      shot.view.eye.z_m - 0.4 * unit()};
+  return shot;
+}
+
+Target draw(const GroupBatches& batches, std::span<const GroupIndex> groups, const Shot& shot,
+            int scale) {
+  GroupBatches::Drawing drawing;
+  for (const GroupIndex g : groups) batches.add_to(g, drawing);
+  batches.add_to(batches.groups(), drawing);
+  Target target = empty_target(shot.width_px * scale, shot.height_px * scale);
+  rasterise(target,
+            project_all(look_at(shot.view, target.width_px, target.height_px), drawing.vertices),
+            drawing.triangles, drawing.objects);
+  return target;
+}
+
+TEST(HzbCulling, LeavesEveryPixelAsItIsAtAnyResolution) {
+  std::size_t left_out = 0, asked = 0;
+  for (std::uint32_t seed = 1; seed <= 4; ++seed) {
+    const Scene scene = hills(seed);
+    const GroupBatches batches(scene.tin, scene.groups);
+    ImageCullingOptions options;
+    options.width_px = 96;
+    options.occluder_triangles = seed % 2 == 0 ? 1000 : 100'000;
+    HzbCulling hzb(scene.tin, batches, options);
+    std::vector<GroupIndex> all;
+    for (GroupIndex g = 0; g < batches.groups(); ++g) all.push_back(g);
+    std::mt19937 random(seed);
+    for (int i = 0; i < 12; ++i) {
+      const Shot shot = random_shot(scene.tin, random);
+      const CullingAnswer answer = hzb.visible(camera_of(shot));
+      asked += answer.nodes_tested;
+      left_out += answer.nodes_tested - answer.visible_groups.size();
+      for (const int scale : {1, 3})
+        ASSERT_EQ(draw(batches, answer.visible_groups, shot, scale).object,
+                  draw(batches, all, shot, scale).object)
+            << "seed " << seed << ", shot " << i << ", scale " << scale;
+    }
+  }
+  EXPECT_GT(left_out, asked / 4) << "it must also leave something out";
+}
+
+TEST(Frustum, ShowsEveryBoxOfWhichATriangleIsDrawn) {
+  const Scene scene = hills(7);
+  const GroupBatches batches(scene.tin, scene.groups);
+  std::vector<GroupIndex> all;
+  for (GroupIndex g = 0; g < batches.groups(); ++g) all.push_back(g);
+  std::mt19937 random(7);
+  std::size_t beside = 0;
+  for (int i = 0; i < 20; ++i) {
+    const Shot shot = random_shot(scene.tin, random);
+    const Frustum frustum(look_at(shot.view, shot.width_px, shot.height_px));
+    for (const std::uint32_t object : draw(batches, all, shot, 1).object) {
+      if (object == kNone) continue;
+      const GroupIndex group = scene.groups.group_of_triangle[object];
+      if (group != kNone) {
+        ASSERT_TRUE(frustum.may_show(batches.box(group)));
+      }
+    }
+    for (const GroupIndex g : all) beside += !frustum.may_show(batches.box(g));
+  }
+  EXPECT_GT(beside, 10 * all.size()) << "half the groups are behind the eye";
+}
+
+TEST(CameraOf, HoldsTheAzimuthOfEveryRay) {
+  std::mt19937 random(3);
+  const auto unit = [&] { return std::uniform_real_distribution<double>(0, 1)(random); };
+  int all_around = 0;
+  for (int i = 0; i < 300; ++i) {
+    Shot shot;
+    shot.width_px = 100 + static_cast<int>(200 * unit());
+    shot.height_px = 100;
+    shot.view.vertical_field_of_view_rad = 0.2 + 1.5 * unit();
+    const double turn = 6.28 * unit(), pitch = 3 * (unit() - 0.5);
+    shot.view.target = {std::cos(turn) * std::cos(pitch), std::sin(turn) * std::cos(pitch),
+                        std::sin(pitch)};
+    const Camera camera = camera_of(shot);
+    if (!camera.view) {
+      ++all_around;
+      continue;
+    }
+    const Projection projection = look_at(shot.view, shot.width_px, shot.height_px);
+    for (int k = 0; k < 50; ++k) {
+      const Position ray = ray_through(projection, 2 * unit() - 1, 2 * unit() - 1);
+      const double middle = (camera.view->from_rad + camera.view->to_rad) / 2;
+      const double turn_rad = std::remainder(std::atan2(ray.y_m, ray.x_m) - middle, 2 * M_PI);
+      ASSERT_LE(std::abs(turn_rad), (camera.view->to_rad - camera.view->from_rad) / 2);
+    }
+  }
+  EXPECT_GT(all_around, 20);
+  EXPECT_LT(all_around, 250);
+}
+
+}  // namespace
+}  // namespace scarp

@@ -1,0 +1,223 @@
+#include "core/culling/mask_culling.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "core/culling/image_culling.h"
+#include "core/occlusion/squares.h"
+#include "core/raster/rasterise.h"
+#include "tests/support/terrain.h"
+
+namespace scarp {
+namespace {
+
+/// The farthest that a place at least distance_m deep moves in a picture, for eyes on a ball.
+double greatest_move_px(double ball_m, double distance_m, double half_angle_rad, double size_px) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> unit(0, 1);
+  const double focal_px = size_px / (2 * std::tan(half_angle_rad));
+  double greatest = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    const double z_m = distance_m * (i % 4 == 0 ? 1 : 1 + 3 * unit(random));
+    const double x_m = z_m * std::tan(half_angle_rad) * (i % 3 == 0 ? 1 : 2 * unit(random) - 1);
+    const double turn = 2 * M_PI * unit(random);
+    const double a_m = ball_m * std::cos(turn), c_m = ball_m * std::sin(turn);
+    greatest = std::max(greatest, std::abs(focal_px * ((x_m - a_m) / (z_m - c_m) - x_m / z_m)));
+  }
+  return greatest;
+}
+
+/// Equation (1) as it is printed.
+double printed_ball_m(double margin_px, double distance_m, double half_angle_rad, double size_px) {
+  return 2 * margin_px * distance_m / (size_px * std::tan(half_angle_rad));
+}
+
+TEST(BallOfMargin, NothingMovesFartherThanTheMarginAcrossThePicture) {
+  for (const double angle_deg : {20.0, 60.0, 90.0, 120.0})
+    for (const double margin_px : {1.0, 6.0, 20.0}) {
+      const double half_rad = angle_deg * M_PI / 360;
+      const double ball_m = ball_of_margin_m(margin_px, 100, half_rad, 512);
+      EXPECT_LE(greatest_move_px(ball_m, 100, half_rad, 512), margin_px * (1 + 1e-9));
+      EXPECT_GT(greatest_move_px(ball_m, 100, half_rad, 512), 0.9 * margin_px) << "and not by far";
+    }
+}
+
+TEST(BallOfMargin, AsPrintedItIsThreeTimesTooLargeAtSixtyDegrees) {
+  const double half_rad = M_PI / 6;
+  EXPECT_GT(greatest_move_px(printed_ball_m(6, 100, half_rad, 512), 100, half_rad, 512), 3 * 6);
+}
+
+TEST(Erode, TakesTheFarthestAround) {
+  std::mt19937 random(2);
+  OcclusionMap map{23, 17, {}};
+  for (int i = 0; i < 23 * 17; ++i)
+    map.depth.push_back(random() % 40 == 0 ? 0 : static_cast<float>(random() % 1000) + 1);
+  const OcclusionMap before = map;
+  erode(map, 2);
+  for (int y = 0; y < 17; ++y)
+    for (int x = 0; x < 23; ++x) {
+      float least = HUGE_VALF;
+      for (int ny = std::max(0, y - 2); ny <= std::min(16, y + 2); ++ny)
+        for (int nx = std::max(0, x - 2); nx <= std::min(22, x + 2); ++nx)
+          least = std::min(least, before.depth[static_cast<std::size_t>(ny * 23 + nx)]);
+      ASSERT_EQ(map.depth[static_cast<std::size_t>(y * 23 + x)], least);
+    }
+}
+
+/// Upright walls across the view, each two triangles, unconnected.
+struct Walls {
+  Tin tin;
+
+  void add(double low_x_m, double high_x_m, double y_m, double high_z_m) {
+    const auto first = static_cast<VertexIndex>(tin.vertices.size());
+    for (const auto& [x_m, z_m] :
+         {std::pair{low_x_m, -50.0}, {high_x_m, -50.0}, {high_x_m, high_z_m}, {low_x_m, high_z_m}})
+      tin.vertices.push_back({x_m, y_m, z_m});
+    tin.triangles.push_back({first, first + 1, first + 2});
+    tin.triangles.push_back({first, first + 2, first + 3});
+  }
+};
+
+TEST(Erode, AnErodedUnionOfOccludersLeaksBetweenThem) {
+  // Two walls, the right one farther away, whose edges meet in the picture: from a little to the
+  // right one looks between them.
+  Walls walls;
+  walls.add(-60, 0, 100, 50);
+  walls.add(0, 120, 200, 50);
+  connect_neighbours(walls.tin);
+  const std::vector<TriangleIndex> all{0, 1, 2, 3};
+  View view;
+  view.eye = {0, 0, 0};
+  view.target = {0, 100, 0};
+  constexpr int kSizePx = 128, kMarginPx = 6;
+  OcclusionMap map{kSizePx, kSizePx, {}};
+  OcclusionMapper mapper(walls.tin);
+  mapper.draw(look_at(view, kSizePx, kSizePx), all, map);
+  const std::size_t middle = kSizePx / 2 * kSizePx + kSizePx / 2;
+  // Drawn as pictures are, the union has no gap, and keeps none when it is eroded.
+  Target target = empty_depth_target(kSizePx, kSizePx);
+  const Projection projection = look_at(view, kSizePx, kSizePx);
+  rasterise(target, project_all(projection, walls.tin.vertices), walls.tin.triangles);
+  OcclusionMap united{kSizePx, kSizePx, target.depth};
+  erode(united, kMarginPx);
+  ASSERT_GT(united.depth[middle], 0) << "the middle counts as covered";
+  // From within the ball that the margin pays for, a ray between the walls reaches what is behind.
+  const double ball_m =
+      ball_of_margin_m(kMarginPx, 100, view.vertical_field_of_view_rad / 2, kSizePx);
+  view.eye.x_m += ball_m / 2;
+  view.target.x_m += ball_m / 2;
+  Target later = empty_depth_target(kSizePx, kSizePx);
+  rasterise(later, project_all(look_at(view, kSizePx, kSizePx), walls.tin.vertices),
+            walls.tin.triangles);
+  std::size_t gaps = 0;
+  for (int x = kSizePx / 4; x < 3 * kSizePx / 4; ++x)
+    gaps += later.depth[static_cast<std::size_t>(kSizePx / 2 * kSizePx + x)] == 0;
+  EXPECT_GT(gaps, 0U);
+  // The conservative map knows of the edge between them.
+  EXPECT_EQ(map.depth[middle], 0);
+}
+
+struct Scene {
+  Tin tin;
+  Groups groups;
+};
+
+Scene hills(std::uint32_t seed) {
+  Scene scene{test::triangulated(test::random_hills(40, 40, 10, seed, 120, 0.01), seed), {}};
+  const LeafGroups leaves = group_by_squares(scene.tin, 24);
+  scene.groups.group_of_triangle = leaves.group_of_triangle;
+  scene.groups.leaf_count = leaves.count;
+  return scene;
+}
+
+Target draw(const GroupBatches& batches, std::span<const GroupIndex> groups, const Shot& shot) {
+  GroupBatches::Drawing drawing;
+  for (const GroupIndex g : groups) batches.add_to(g, drawing);
+  batches.add_to(batches.groups(), drawing);
+  Target target = empty_target(shot.width_px, shot.height_px);
+  rasterise(target,
+            project_all(look_at(shot.view, target.width_px, target.height_px), drawing.vertices),
+            drawing.triangles, drawing.objects);
+  return target;
+}
+
+/// Walks over hills and calls visit(step, answer, method) at each of the frames.
+void walk(std::uint32_t seed, double step_m, const MaskOptions& options,
+          const std::function<void(const GroupBatches&, const Shot&, const CullingAnswer&,
+                                   const MaskCulling&)>& visit) {
+  const Scene scene = hills(seed);
+  const GroupBatches batches(scene.tin, scene.groups);
+  const BoxTree tree(batches);
+  MaskCulling mask(scene.tin, batches, tree, options);
+  for (int i = 0; i < 20; ++i) {
+    Shot shot;
+    shot.width_px = 160;
+    shot.height_px = 90;
+    shot.view.eye = {200, 20 + i * step_m, 60};
+    shot.view.target = {205, 120 + i * step_m, 55};
+    const CullingAnswer answer = mask.visible(camera_of(shot));
+    visit(batches, shot, answer, mask);
+  }
+}
+
+TEST(MaskCulling, LeavesEveryPixelAsItIsWhereTheMaskIsNew) {
+  MaskOptions options;
+  options.least_distance_m = 20;
+  options.margin_px = 1;
+  std::size_t left_out = 0, frames = 0;
+  for (std::uint32_t seed = 1; seed <= 3; ++seed)
+    walk(seed, 15, options,
+         [&](const auto& batches, const Shot& shot, const auto& answer, const MaskCulling& mask) {
+           std::vector<GroupIndex> all;
+           for (GroupIndex g = 0; g < batches.groups(); ++g) all.push_back(g);
+           ASSERT_EQ(draw(batches, answer.visible_groups, shot).object,
+                     draw(batches, all, shot).object);
+           const Frustum frustum(look_at(shot.view, shot.width_px, shot.height_px));
+           for (const GroupIndex g : all) left_out += frustum.may_show(batches.box(g));
+           left_out -= answer.visible_groups.size();
+           ++frames;
+           EXPECT_EQ(mask.critical_frames() % 20, frames % 20) << "every frame is critical";
+         });
+  EXPECT_GT(left_out, frames) << "it must also leave something out";
+}
+
+TEST(MaskCulling, KeepsItsMaskWhileTheMarginPaysForTheWay) {
+  MaskOptions options;
+  options.least_distance_m = 20;
+  std::uint64_t critical = 0;
+  walk(2, 0.02, options, [&](const auto&, const Shot&, const auto&, const MaskCulling& mask) {
+    critical = mask.critical_frames();
+  });
+  EXPECT_GE(critical, 1U);
+  EXPECT_LT(critical, 5U);
+}
+
+TEST(BoxTree, HoldsEveryGroupOnceInBoxesThatHoldItsChildren) {
+  const Scene scene = hills(3);
+  const GroupBatches batches(scene.tin, scene.groups);
+  const BoxTree tree(batches);
+  std::vector<int> found(batches.groups(), 0);
+  const auto holds = [](const Bounds& outer, const Bounds& inner) {
+    return outer.low.x_m <= inner.low.x_m && outer.high.x_m >= inner.high.x_m &&
+           outer.low.y_m <= inner.low.y_m && outer.high.y_m >= inner.high.y_m &&
+           outer.low.z_m <= inner.low.z_m && outer.high.z_m >= inner.high.z_m;
+  };
+  for (const BoxTree::Node& node : tree.nodes()) {
+    for (const GroupIndex g : tree.groups_of(node)) EXPECT_TRUE(holds(node.box, batches.box(g)));
+    if (node.left == kNone) {
+      ASSERT_EQ(node.count, 1U);
+      ++found[tree.groups_of(node)[0]];
+    } else {
+      EXPECT_EQ(tree.nodes()[node.left].count + tree.nodes()[node.right].count, node.count);
+      EXPECT_EQ(tree.nodes()[node.left].triangles + tree.nodes()[node.right].triangles,
+                node.triangles);
+    }
+  }
+  for (const int count : found) EXPECT_EQ(count, 1);
+}
+
+}  // namespace
+}  // namespace scarp
