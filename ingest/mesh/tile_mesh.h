@@ -24,7 +24,8 @@ namespace scarp {
 ///
 /// A tile that holds the whole raster gets what mesh_samples gives, bit for bit.
 /// Errors: Error(kInput) where the grid bends so much that its triangles turn over.
-/// Cost: mesh_samples, and for each edge of n samples at most O(n^2 log n).
+/// Cost: mesh_samples, and for each edge trying pieces of up to 256 cells; on rough ground they are
+/// short. A tile of a large raster takes about half the time a sample that the raster would.
 /// Side, accuracy, threads, source: as mesh_samples.
 Mesh mesh_tile(const TileScheme& scheme, const TileId& tile, const SampleGrid& window,
                const MeshOptions& options, const Progress& progress);
