@@ -188,12 +188,13 @@ void add_viewshed(CLI::App& app, ViewshedOptions& o, std::function<int()>& run) 
   c->add_option("--crs", o.crs, "CRS of the observers, such as OGC:CRS84; the DEM's unless given");
   c->add_option("--target-height", o.target_height_m, "Metres above ground of what is looked for")
       ->check(CLI::Range(0.0, 100'000.0));
+  constexpr double kLeastDistanceM = 1e-3, kMostDistanceM = 1e8;
   c->add_option("--max-distance", o.max_distance_m,
                 "Metres along the ground. Of a scene of several tiles, tiles beyond it are neither "
                 "read nor in the answer")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(kLeastDistanceM, kMostDistanceM));
   c->add_option("--min-distance", o.min_distance_m, "Metres along the ground")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0.0, kMostDistanceM));
   c->add_option_function<std::string>(
       "--azimuth",
       [&o](const std::string& text) { o.azimuth_deg = parse_range("--azimuth", text); },

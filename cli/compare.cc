@@ -11,6 +11,7 @@
 #include "cli/commands.h"
 #include "cli/compare_picture.h"
 #include "cli/loaded_scene.h"
+#include "cli/outputs.h"
 #include "cli/progress_bar.h"
 #include "cli/scene_culling.h"
 #include "cli/verify.h"
@@ -410,8 +411,7 @@ int run_compare(const CompareOptions& options) {
       throw Error(ErrorCode::kUsage,
                   fmt::format("--heights {}: metres above ground were expected", height_m));
   const LoadedScene scene(options.scene);
-  OutputFolder output(options.output,
-                      options.common.overwrite ? Existing::kReplace : Existing::kRefuse);
+  OutputFolder output(options.output, existing(options.common));
   Comparison comparison(options, scene);
   comparison.run();
   const std::size_t triangles = scene.tin.triangles.size();

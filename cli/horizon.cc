@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
+#include "cli/outputs.h"
 #include "cli/progress_bar.h"
 #include "cli/sight_surface.h"
 #include "core/error/error.h"
@@ -131,8 +132,7 @@ int run_horizon(const HorizonOptions& options) {
     throw Error(ErrorCode::kUsage,
                 fmt::format("'{}': a name that ends in .csv or .json was expected", path));
   std::optional<PartFile> file;
-  if (!path.empty())
-    file.emplace(path, options.common.overwrite ? Existing::kReplace : Existing::kRefuse);
+  if (!path.empty()) file.emplace(path, existing(options.common));
   ProgressBar bar(!options.common.json);
   DemOptions dem = options.dem;
   dem.memory_budget_bytes = options.common.memory_budget_bytes;

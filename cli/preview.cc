@@ -6,6 +6,7 @@
 
 #include "cli/commands.h"
 #include "cli/loaded_scene.h"
+#include "cli/outputs.h"
 #include "cli/picture_size.h"
 #include "cli/scene_culling.h"
 #include "core/culling/visible_groups.h"
@@ -65,7 +66,7 @@ int run_preview(const PreviewCommandOptions& options) {
     picture = preview_from_above(scene.tin, scene.groups, shape);
   }
   write_png(options.output, picture.width_px, picture.height_px, picture.rgb,
-            options.common.overwrite ? Existing::kReplace : Existing::kRefuse);
+            existing(options.common));
   if (options.common.json) {
     const nlohmann::json result = {{"picture", options.output},
                                    {"width_px", picture.width_px},

@@ -67,7 +67,7 @@ class SightRun {
     if (!as_picture_ && !path.ends_with(".json"))
       throw Error(ErrorCode::kUsage,
                   fmt::format("'{}': a name that ends in .svg or .json was expected", path));
-    file_.emplace(path, options_.common.overwrite ? Existing::kReplace : Existing::kRefuse);
+    file_.emplace(path, existing(options_.common));
   }
 
   void open() {

@@ -110,15 +110,7 @@ std::unique_ptr<SightSurface> open_surface(const std::vector<std::string>& sourc
 }
 
 SurfaceNote note_of(const SightSurface& surface) {
-  const FrameDescription& frame = surface.frame().description();
-  SurfaceNote note;
-  note.surface = surface.name();
-  note.earth = frame.earth == Earth::kFlat ? "flat" : "ellipsoid";
-  note.heights = frame.earth == Earth::kFlat ? "above the map plane"
-                 : frame.geoid_file.empty()  ? "taken as ellipsoidal"
-                                             : "geoid added";
-  note.refraction = frame.refraction;
-  return note;
+  return note_of(surface.name(), surface.frame().description());
 }
 
 }  // namespace scarp

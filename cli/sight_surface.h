@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cli/options.h"
+#include "cli/outputs.h"
 #include "core/sight/ground_along.h"
 #include "core/sight/line_of_sight.h"
 #include "ingest/crs/geo_frame.h"
@@ -52,12 +53,6 @@ class SightSurface {
 std::unique_ptr<SightSurface> open_surface(const std::vector<std::string>& sources,
                                            const DemOptions& options, const Progress& progress);
 
-/// What the surface and the frame are, for every output: {"surface", "earth", "refraction",
-/// "heights"}.
-struct SurfaceNote {
-  std::string surface, earth, heights;
-  double refraction = 0;
-};
 SurfaceNote note_of(const SightSurface& surface);
 
 }  // namespace scarp

@@ -76,6 +76,7 @@ ViewSource::ViewSource(const std::vector<std::string>& sources,
   }
   ground_ = read_ground(sources, options, progress);
   if (!obstacles.empty()) read_obstacles(obstacles, options);
+  tops_.emplace(obstacles_ ? *obstacles_ : ground_.grid, ground_.grid);
 }
 
 ViewSource::SceneGround::SceneGround(const std::string& path, const std::optional<ViewReach>& reach)
@@ -130,8 +131,10 @@ void ViewSource::read_obstacles(const std::vector<std::string>& files, const Dem
 
 ViewGround ViewSource::ground() const {
   if (scene_) return ViewGround::of_tin(samples(), scene_->index);
-  if (obstacles_) return ViewGround::under(samples(), *obstacles_);
-  return samples();
+  ViewGround ground =
+      obstacles_ ? ViewGround::under(samples(), *obstacles_) : ViewGround(samples());
+  ground.tops = &*tops_;
+  return ground;
 }
 
 GroundEye ViewSource::place(const TypedPosition& typed, const std::string& crs) const {

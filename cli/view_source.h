@@ -67,6 +67,7 @@ class ViewSource {
   std::unique_ptr<const SceneGround> scene_;
   Ground ground_;
   std::optional<GroundGrid> obstacles_;
+  std::optional<GroundTops> tops_;  // of a DEM
 };
 
 }  // namespace scarp

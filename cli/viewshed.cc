@@ -9,9 +9,13 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <numeric>
+#include <set>
 
 #include "cli/build/layers.h"
 #include "cli/commands.h"
+#include "cli/outputs.h"
+#include "cli/scratch_memory.h"
 #include "cli/stages.h"
 #include "cli/view_source.h"
 #include "core/error/error.h"
@@ -115,6 +119,23 @@ void check_total(const ViewshedOptions& options) {
                             single));
 }
 
+/// No output may take the place of an input, or of another output.
+void check_names(const ViewshedOptions& options) {
+  std::vector<std::string> taken = options.sources;
+  taken.insert(taken.end(), options.obstacles.begin(), options.obstacles.end());
+  if (!options.observers_file.empty()) taken.push_back(options.observers_file);
+  for (const std::string& file : {options.output, options.polygons}) {
+    if (file.empty()) continue;
+    for (const std::string& other : taken) {
+      std::error_code no_file;
+      if (file == other || std::filesystem::equivalent(file, other, no_file))
+        throw Error(ErrorCode::kUsage,
+                    fmt::format("'{}': is named twice; an output needs a name of its own", file));
+    }
+    taken.push_back(file);
+  }
+}
+
 /// Wrong use shows before any work.
 void check_options(const ViewshedOptions& options) {
   if (options.total) {
@@ -137,12 +158,9 @@ void check_options(const ViewshedOptions& options) {
       (options.mode == ViewshedMode::kGround || options.mode == ViewshedMode::kDem))
     throw Error(ErrorCode::kUsage,
                 "--polygons is for --mode visible and count; leave one of them out");
+  check_names(options);
   for (const std::string& file : {options.output, options.polygons})
-    if (!file.empty() && !options.common.overwrite && std::filesystem::exists(file))
-      throw Error(ErrorCode::kInput,
-                  fmt::format("'{}': exists; a new file was expected; give --overwrite to replace "
-                              "it",
-                              file));
+    check_new_file(file, options.common);
   if (!options.each_folder.empty() && !std::filesystem::is_directory(options.each_folder))
     throw Error(ErrorCode::kInput,
                 fmt::format("'{}': is no folder; one for the rasters of --each was expected; make "
@@ -191,6 +209,9 @@ class ViewshedRun {
     DemOptions dem = options_.dem;
     dem.memory_budget_bytes = options_.common.memory_budget_bytes;
     dem.more_bytes_per_sample = more_bytes_per_sample(options_);
+    dem.make_room = [&](double samples, double reading_bytes) {
+      return make_room(samples, reading_bytes);
+    };
     std::optional<ViewReach> reach;
     if (options_.max_distance_m && options_.observers_file.empty() && !options_.total)
       reach = ViewReach{options_.observers, options_.crs, *options_.max_distance_m};
@@ -200,10 +221,44 @@ class ViewshedRun {
                        limits_of(options_.min_distance_m, options_.max_distance_m,
                                  options_.azimuth_deg, options_.pitch_deg),
                        ""});
-    if (options_.observers_file.empty()) return;
-    const std::string& wkt = source_->dem().frame->description().crs_wkt;
-    for (const ObserverRecord& record : read_observers(options_.observers_file, wkt, options_.crs))
-      eyes_.push_back(eye_of(record, options_, *source_));
+    if (!options_.observers_file.empty()) {
+      const std::string& wkt = source_->dem().frame->description().crs_wkt;
+      for (const ObserverRecord& record :
+           read_observers(options_.observers_file, wkt, options_.crs))
+        eyes_.push_back(eye_of(record, options_, *source_));
+    }
+    if (!options_.each_folder.empty()) name_each();
+  }
+
+  /// Gives the raster of each eye a name of its own.
+  void name_each() {
+    std::set<std::string> taken;
+    for (std::size_t i = 0; i < eyes_.size(); ++i) {
+      std::string name = eyes_[i].name;
+      for (char& c : name)
+        if (c == '/' || c == '\\' || c == '\0') c = '_';
+      if (name.empty() || name.front() == '.') name = fmt::format("{:04}", i + 1);
+      std::string own = name;
+      for (int again = 2; !taken.insert(own).second; ++again)
+        own = fmt::format("{}_{}", name, again);
+      each_paths_.push_back(fmt::format("{}/{}.tif", options_.each_folder, own));
+      check_new_file(each_paths_.back(), options_.common);
+    }
+  }
+
+  /// Puts the large arrays on the disk where memory is tight but enough for blocks.
+  bool make_room(double samples, double reading_bytes) {
+    if (!options_.polygons.empty()) return false;  // outlines are traced in memory
+    // For each thread the history of a part, with room to spare; and what comes and goes, such as
+    // pages between two reliefs and blocks that are packed.
+    constexpr double kHistoryBytesPerSample = 0.15, kWorkBytes = 32e6;
+    const auto budget_bytes = static_cast<double>(options_.common.memory_budget_bytes);
+    const double work_bytes =
+        reading_bytes + kWorkBytes + thread_count() * kHistoryBytesPerSample * samples;
+    if (static_cast<double>(resident_now_bytes()) + work_bytes > budget_bytes) return false;
+    scratch_.emplace(folder_of(options_.output),
+                     static_cast<std::uint64_t>(budget_bytes - kWorkBytes));
+    return true;
   }
 
   bool measures_heights() const {
@@ -216,7 +271,7 @@ class ViewshedRun {
         static_cast<std::size_t>(grid.columns()) * static_cast<std::size_t>(grid.rows());
     if (measures_heights()) {
       least_.emplace(grid);
-      if (!options_.each_folder.empty()) eye_heights_m_.resize(samples);
+      if (!options_.each_folder.empty()) eye_heights_m_ = LargeArray<float>(samples);
     } else {
       sight_ = LargeArray<Seen>(samples);
     }
@@ -225,21 +280,31 @@ class ViewshedRun {
     const bool alone = eyes_.size() == 1 &&
                        !(eyes_[0].limits.max_distance_m < std::numeric_limits<double>::infinity());
     if (options_.mode == ViewshedMode::kVisible && !alone) any_.emplace(grid);
-    for (std::size_t i = 0; i < eyes_.size(); ++i) {
+    std::size_t done = 0;
+    for (const std::size_t i : order_of_eyes()) {
       see_from(eyes_[i]);
       if (!options_.each_folder.empty()) write_each(i);
-      if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(eyes_.size()));
+      if (progress) progress(static_cast<double>(++done) / static_cast<double>(eyes_.size()));
     }
+  }
+
+  /// For heights the highest eyes first: they see most, and what is seen is not measured again. The
+  /// answer is the same in any order.
+  std::vector<std::size_t> order_of_eyes() const {
+    std::vector<std::size_t> order(eyes_.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    if (least_)
+      std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+        return eyes_[a].at.position.z_m > eyes_[b].at.position.z_m;
+      });
+    return order;
   }
 
   /// Looks from samples of the ground back at all places: sight is symmetric.
   void see_back(const Progress& progress) {
     const GroundGrid& grid = source_->samples();
     const auto earth = source_->dem().frame->earth_frame();
-    std::uint64_t known = 0;
-    for (std::int32_t row = 0; row < grid.rows(); ++row)
-      for (std::int32_t column = 0; column < grid.columns(); ++column)
-        known += grid.is_known(column, row) ? 1 : 0;
+    const std::uint64_t known = count_known(grid);
     if (known == 0)
       throw Error(ErrorCode::kInput, fmt::format("'{}': no sample is known; ground was expected; "
                                                  "check --nodata and --obstacles",
@@ -249,7 +314,7 @@ class ViewshedRun {
     looks_share_ = static_cast<double>(looks_) / static_cast<double>(known);
     sight_ = LargeArray<Seen>(static_cast<std::size_t>(grid.columns()) *
                               static_cast<std::size_t>(grid.rows()));
-    SeenGround seen(grid);
+    SeenGround& seen = seen_ground_.emplace(grid);
     const ViewLimits limits = limits_of(options_.min_distance_m, options_.max_distance_m, {}, {});
     for (std::size_t i = 0; i < places.size(); ++i) {
       const Position ground =
@@ -262,12 +327,12 @@ class ViewshedRun {
       decided_.add(counts);
       if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(places.size()));
     }
-    areas_km2_ = seen.areas_km2(looks_share_);
+    sight_ = LargeArray<Seen>();
+    areas_km2_ = seen.finish_km2(looks_share_);
   }
 
   void write_total() {
-    RasterLayer layer =
-        layer_over(source_->dem(), std::span<const float>(areas_km2_), "ground seen");
+    RasterLayer layer = layer_over(source_->dem(), areas_km2_, "ground seen");
     layer.unit = "km2";
     layer.nodata = std::numeric_limits<double>::quiet_NaN();
     layer.metadata["VALUES"] = "ground that is seen from here, square kilometres; NaN void";
@@ -291,8 +356,8 @@ class ViewshedRun {
     if (least_ && options_.each_folder.empty()) {
       least_->lower(source_->ground(), earth, eye, &counts);
     } else if (least_) {
-      window_ = heights_from(source_->ground(), earth, eye, eye_heights_m_, &counts);
-      least_->add(window_, eye_heights_m_);
+      window_ = heights_from(source_->ground(), earth, eye, eye_heights_m_.span(), &counts);
+      least_->add(window_, eye_heights_m_.span());
     } else {
       window_ = view_from(source_->ground(), earth, eye, sight_.span(), &counts);
       if (count_) count_->add(window_, sight_.span());
@@ -301,20 +366,12 @@ class ViewshedRun {
     decided_.add(counts);
   }
 
-  Existing existing() const {
-    return options_.common.overwrite ? Existing::kReplace : Existing::kRefuse;
-  }
-
   /// The raster of the eye that was last seen from.
   void write_each(std::size_t i) {
-    std::string name = eyes_[i].name;
-    for (char& c : name)
-      if (c == '/' || c == '\\' || c == '\0') c = '_';
-    if (name.empty() || name.front() == '.') name = fmt::format("{:04}", i + 1);
-    const std::string path = fmt::format("{}/{}.tif", options_.each_folder, name);
+    const std::string& path = each_paths_[i];
     if (least_) {
       LeastHeight alone(source_->samples());
-      alone.add(window_, eye_heights_m_);
+      alone.add(window_, eye_heights_m_.span());
       write_heights(path, alone.heights_m(), i, i + 1);
     } else {
       AnyEye alone(source_->samples());
@@ -354,13 +411,15 @@ class ViewshedRun {
                          "visible");
       layer.nodata = static_cast<double>(Seen::kUnknown);
     }
-    write_area_polygons(options_.polygons, layer, count_ ? "eyes" : "visible", existing());
+    write_area_polygons(options_.polygons, layer, count_ ? "eyes" : "visible",
+                        existing(options_.common));
   }
 
   void write_layer(const std::string& path, RasterLayer& layer, std::size_t first,
                    std::size_t end) const {
     describe(layer.metadata, first, end);
-    write_geotiff_cog(path, layer, existing());
+    layer.saves_memory = scratch_.has_value();
+    write_geotiff_cog(path, layer, existing(options_.common));
   }
 
   /// @param first, end  the eyes that the raster is of
@@ -370,11 +429,12 @@ class ViewshedRun {
                                               sight.size());
     RasterLayer layer;
     if (options_.gdal_values) {
-      gdal_values_.resize(bytes.size());
-      std::transform(sight.begin(), sight.end(), gdal_values_.begin(), [](Seen s) {
+      gdal_values_ = LargeArray<std::uint8_t>(bytes.size());
+      std::transform(sight.begin(), sight.end(), gdal_values_.span().begin(), [](Seen s) {
         return static_cast<std::uint8_t>(s == Seen::kVisible ? 255 : 0);
       });
-      layer = layer_over(source_->dem(), std::span<const std::uint8_t>(gdal_values_), "visible");
+      layer =
+          layer_over(source_->dem(), std::span<const std::uint8_t>(gdal_values_.span()), "visible");
       layer.metadata["VALUES"] = "255 visible, 0 hidden or unknown";
     } else {
       layer = layer_over(source_->dem(), bytes, "visible");
@@ -433,12 +493,7 @@ class ViewshedRun {
       observers += fmt::format("{}{:.10g},{:.10g},{:.3f}asl", i > first ? " " : "",
                                eyes_[i].at.map.x, eyes_[i].at.map.y, eyes_[i].at.map.height_m);
     metadata["MODE"] = options_.total ? "total" : name_of(options_.mode);
-    metadata["SURFACE"] = source_->surface();
-    metadata["EARTH"] = frame.earth == Earth::kFlat ? "flat" : "ellipsoid";
-    metadata["REFRACTION"] = fmt::format("{:g}", frame.refraction);
-    metadata["HEIGHTS"] = frame.earth == Earth::kFlat ? "above the map plane"
-                          : frame.geoid_file.empty()  ? "taken as ellipsoidal"
-                                                      : "geoid added";
+    write_note(note_of(source_->surface(), frame), metadata);
     metadata["HEIGHT_UNIT_OF_DEM"] = source_->dem().height_unit;
     if (!options_.total) {
       metadata["OBSERVERS"] = std::to_string(end - first);
@@ -484,14 +539,10 @@ class ViewshedRun {
       result["seen_samples"] = std::count_if(counts.begin(), counts.end(),
                                              [&](std::uint32_t n) { return n > 0 && !is_void(n); });
     } else {
-      const std::span<const Seen> sight = seen();
-      const auto samples_with = [&](Seen value) {
-        return std::count(sight.begin(), sight.end(), value);
-      };
-      result["visible_samples"] = samples_with(Seen::kVisible);
-      result["unknown_samples"] = samples_with(Seen::kUnknown);
-      result["hidden_samples"] = sight.size() - result["visible_samples"].get<std::size_t>() -
-                                 result["unknown_samples"].get<std::size_t>();
+      const SeenTotals totals = count_seen(seen());
+      result["visible_samples"] = totals.visible;
+      result["hidden_samples"] = totals.hidden;
+      result["unknown_samples"] = totals.unknown;
     }
     return result;
   }
@@ -505,9 +556,7 @@ class ViewshedRun {
       result["decided"] = {{"targets", decided_.targets},
                            {"compared_with_part", decided_.traced_part},
                            {"judged_whole", decided_.traced_whole}};
-      for (const StageCost& cost : stages_.costs())
-        result["stages"].push_back(
-            {{"name", cost.name}, {"seconds", cost.seconds}, {"peak_bytes", cost.peak_bytes}});
+      result["stages"] = stages_json(stages_);
       fmt::print("{}\n", result.dump(2));
       return;
     }
@@ -530,18 +579,21 @@ class ViewshedRun {
 
   const ViewshedOptions& options_;
   Stages stages_;
+  std::optional<ScratchMemory> scratch_;  // holds what follows, where it is used
   std::optional<ViewSource> source_;
   std::vector<RunEye> eyes_;
+  std::vector<std::string> each_paths_;  // of --each, an eye each
   LargeArray<Seen> sight_;
   std::optional<AnyEye> any_;
   std::optional<EyeCount> count_;
   std::optional<LeastHeight> least_;
-  std::vector<float> areas_km2_;  // of --total
+  std::optional<SeenGround> seen_ground_;  // of --total
+  std::span<const float> areas_km2_;       // in it
   std::size_t looks_ = 0;
   double looks_share_ = 1;  // of the known samples
-  std::vector<float> eye_heights_m_;
+  LargeArray<float> eye_heights_m_;
   SampleWindow window_;  // of the eye last seen from
-  std::vector<std::uint8_t> gdal_values_;
+  LargeArray<std::uint8_t> gdal_values_;
   SweepCounts decided_;
 };
 

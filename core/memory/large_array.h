@@ -8,13 +8,28 @@
 
 namespace scarp {
 
-/// Uninitialised memory for a large array, in the system's large pages where it has them: fewer
-/// faults when it is touched first, and columns of a raster stay within reach of the processor's
-/// address cache. Throws std::bad_alloc.
-void* allocate_large(std::size_t bytes);
-void free_large(void* memory);
+/// Where large arrays live.
+class LargeMemory {
+ public:
+  virtual ~LargeMemory() = default;
+  /// Uninitialised, aligned to 64 bytes. Requires bytes > 0.
+  virtual void* allocate(std::size_t bytes) = 0;
+  virtual void release(void* memory, std::size_t bytes) = 0;
+  /// Called from any thread between pieces of work: the moment to let go of what is not in use.
+  virtual void relieve() = 0;
+};
 
-/// An array of plain values of fixed size. Uninitialised until written.
+/// Every later large array lives there; null for ordinary memory, in the system's large pages where
+/// it has them: fewer faults when it is touched first, and columns of a raster stay within reach of
+/// the processor's address cache. Arrays keep the memory that they were made in, which must outlive
+/// them. Requires that no other thread makes one meanwhile.
+void use_large_memory(LargeMemory* memory);
+LargeMemory& large_memory();
+
+/// Between pieces of work that touch large arrays; costs nothing in ordinary memory.
+void relieve_large_memory();
+
+/// An array of plain values of fixed size. Uninitialised until written. Throws std::bad_alloc.
 template <typename Value>
 class LargeArray {
   static_assert(std::is_trivially_copyable_v<Value>);
@@ -22,15 +37,22 @@ class LargeArray {
  public:
   LargeArray() = default;
   explicit LargeArray(std::size_t size)
-      : values_(static_cast<Value*>(allocate_large(size * sizeof(Value)))), size_(size) {}
+      : memory_(&large_memory()),
+        values_(size == 0 ? nullptr : static_cast<Value*>(memory_->allocate(size * sizeof(Value)))),
+        size_(size) {}
   LargeArray(LargeArray&& other) noexcept
-      : values_(std::exchange(other.values_, nullptr)), size_(std::exchange(other.size_, 0)) {}
+      : memory_(other.memory_),
+        values_(std::exchange(other.values_, nullptr)),
+        size_(std::exchange(other.size_, 0)) {}
   LargeArray& operator=(LargeArray&& other) noexcept {
+    std::swap(memory_, other.memory_);
     std::swap(values_, other.values_);
     std::swap(size_, other.size_);
     return *this;
   }
-  ~LargeArray() { free_large(values_); }
+  ~LargeArray() {
+    if (values_) memory_->release(values_, size_ * sizeof(Value));
+  }
 
   std::size_t size() const { return size_; }
   Value& operator[](std::size_t i) { return values_[i]; }
@@ -39,6 +61,7 @@ class LargeArray {
   std::span<const Value> span() const { return {values_, size_}; }
 
  private:
+  LargeMemory* memory_ = nullptr;
   Value* values_ = nullptr;
   std::size_t size_ = 0;
 };

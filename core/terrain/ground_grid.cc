@@ -105,11 +105,7 @@ Position GroundGrid::at(std::int32_t column, std::int32_t row) const {
     return {separable->x_of_column_m[static_cast<std::size_t>(column)],
             separable->y_of_row_m[static_cast<std::size_t>(row)], z};
   if (const auto* blocks = std::get_if<BlockPlacement>(&placement_))
-    return {round_to_lattice(blocks->value(BlockPlacement::kX, column, row) +
-                             blocks->value(BlockPlacement::kTiltX, column, row) * z),
-            round_to_lattice(blocks->value(BlockPlacement::kY, column, row) +
-                             blocks->value(BlockPlacement::kTiltY, column, row) * z),
-            z};
+    return blocks->place(column, row, z);
   const auto& own = std::get<ExplicitPlacement>(placement_);
   const std::size_t i = static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
                         static_cast<std::size_t>(column);
@@ -127,11 +123,7 @@ Position GroundGrid::raised(std::int32_t column, std::int32_t row, double height
   }
   const double z = round_to_lattice(flattened_height(
       *blocks, column, row, height_on_normal(*blocks, column, row, p.z_m) + height_m));
-  return {round_to_lattice(blocks->value(BlockPlacement::kX, column, row) +
-                           blocks->value(BlockPlacement::kTiltX, column, row) * z),
-          round_to_lattice(blocks->value(BlockPlacement::kY, column, row) +
-                           blocks->value(BlockPlacement::kTiltY, column, row) * z),
-          z};
+  return blocks->place(column, row, z);
 }
 
 Position GroundGrid::place(double column, double row, double height_m) const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
@@ -46,11 +47,12 @@ struct BlockPlacement {
   std::vector<Block> blocks;  ///< row by row
 
   const Block& block_of(std::int32_t column, std::int32_t row) const {
-    return blocks[static_cast<std::size_t>(row / side) * static_cast<std::size_t>(blocks_across) +
-                  static_cast<std::size_t>(column / side)];
+    const int bits = std::countr_zero(static_cast<std::uint32_t>(side));
+    return blocks[static_cast<std::size_t>(row >> bits) * static_cast<std::size_t>(blocks_across) +
+                  static_cast<std::size_t>(column >> bits)];
   }
   /// Place within a block, in [-1, 1), and up to 1 beyond its last sample.
-  double local(std::int32_t index) const { return (index % side) * (2.0 / side) - 1; }
+  double local(std::int32_t index) const { return (index & (side - 1)) * (2.0 / side) - 1; }
 
   /// One quantity along the part of a row that a block holds.
   struct Along {
@@ -69,6 +71,22 @@ struct BlockPlacement {
 
   double value(Quantity quantity, std::int32_t column, std::int32_t row) const {
     return Along(*this, quantity, column, row).at(local(column));
+  }
+
+  /// The plan position, rounded to the lattice, of a flattened height on the normal of a sample.
+  Position place(std::int32_t column, std::int32_t row, double z_m) const {
+    const Block& block = block_of(column, row);
+    const double step = 2.0 / side;
+    const double u = (column & (side - 1)) * step - 1, v = (row & (side - 1)) * step - 1;
+    const auto at = [&](Quantity quantity) {
+      const Biquadratic& k = block[quantity];
+      const double constant = k[0] + v * (k[1] + v * k[2]);
+      const double linear = k[3] + v * (k[4] + v * k[5]);
+      const double square = k[6] + v * (k[7] + v * k[8]);
+      return constant + u * (linear + u * square);
+    };
+    return {round_to_lattice(at(kX) + at(kTiltX) * z_m),
+            round_to_lattice(at(kY) + at(kTiltY) * z_m), z_m};
   }
 };
 

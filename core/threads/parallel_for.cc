@@ -9,6 +9,8 @@
 #include <thread>
 #include <vector>
 
+#include "core/memory/large_array.h"
+
 #ifndef SCARP_STD_THREADS
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
@@ -47,7 +49,10 @@ void parallel_for(std::size_t count, const std::function<void(std::size_t)>& bod
   for (int t = 0; t < thread_count(); ++t) {
     threads.emplace_back([&] {
       try {
-        for (std::size_t i = next++; i < count; i = next++) body(i);
+        for (std::size_t i = next++; i < count; i = next++) {
+          body(i);
+          relieve_large_memory();
+        }
       } catch (...) {
         const std::scoped_lock lock(failure_mutex);
         failure = std::current_exception();
@@ -67,7 +72,11 @@ void parallel_for(std::size_t count, const std::function<void(std::size_t)>& bod
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                   static_cast<std::size_t>(thread_count()));
   tbb::task_arena arena(thread_count());
-  arena.execute([&] { tbb::parallel_for(std::size_t{0}, count, body, tbb::simple_partitioner()); });
+  const auto one = [&](std::size_t i) {
+    body(i);
+    relieve_large_memory();
+  };
+  arena.execute([&] { tbb::parallel_for(std::size_t{0}, count, one, tbb::simple_partitioner()); });
 }
 
 #endif

@@ -12,7 +12,7 @@ namespace scarp {
 float height_up_to(const GroundGrid& stands, double z_m, std::int32_t column, std::int32_t row);
 
 /// Least height over a sample at which a target is seen, from all lines between: metres, rounded up
-/// as PartSweep::run_heights has it. 0 exactly where the sample is seen; NaN where the line is over
+/// as sweep_heights has it. 0 exactly where the sample is seen; NaN where the line is over
 /// void ground; infinite straight above an eye under ground.
 /// @param sight   of the eye over the grid that blocks
 /// @param stands  of the same placement; requires the sample known in both

@@ -143,15 +143,15 @@ bool take_rises(std::size_t count, const float* __restrict t, const float* __res
 }
 
 SCARP_FOR_EACH_TARGET
-bool near_even_places(std::size_t edges, std::size_t count, const float* __restrict t,
-                      float* __restrict place) {
+bool near_even_places(std::int32_t first_edge, std::size_t edges, std::size_t count,
+                      const float* __restrict t, float* __restrict place) {
   const float spacing =
       (t[count - 1] - t[0]) / static_cast<float>(static_cast<std::int32_t>(count) - 1);
   const float per_edge = 1 / spacing, begin = -t[0] / spacing;
   const auto last = static_cast<std::int32_t>(count) - 2;
   std::int32_t misses = 0;
   for (std::size_t e = 0; e < edges; ++e) {
-    const auto edge = static_cast<float>(static_cast<std::int32_t>(e));
+    const auto edge = static_cast<float>(first_edge + static_cast<std::int32_t>(e));
     std::int32_t guess = static_cast<std::int32_t>(edge * per_edge + begin);
     guess = guess < 1 ? 1 : guess;
     guess = guess > last - 1 ? last - 1 : guess;

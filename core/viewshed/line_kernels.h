@@ -55,10 +55,11 @@ void take_level_picture(std::size_t count, double forwards, const double* sidewa
 bool take_rises(std::size_t count, const float* t, const float* s, const std::uint8_t* is_void,
                 float least_spacing, float* rise, float* steep);
 
-/// Where bins' edges fall among samples that are nearly even: place[e] is the sample before edge e,
-/// and how far the edge is towards the next. @return false where a first guess misses by more than
-/// one sample; nothing holds then
-bool near_even_places(std::size_t edges, std::size_t count, const float* t, float* place);
+/// Where bins' edges from first_edge on fall among samples that are nearly even: place[e] is the
+/// sample before the edge, and how far the edge is towards the next. @return false where a first
+/// guess misses by more than one sample; nothing holds then
+bool near_even_places(std::int32_t first_edge, std::size_t edges, std::size_t count, const float* t,
+                      float* place);
 
 /// place[e] = e * per_edge + begin.
 void even_places(std::size_t count, float per_edge, float begin, float* place);

@@ -33,6 +33,12 @@ std::int32_t RayClimb::last_before(std::int32_t line, Seen2d& before, Seen2d& af
   const double guess = std::floor(eye_sample_ + (line - eye_line_) * samples_per_line_);
   auto i = static_cast<std::int32_t>(std::clamp(guess, 0.0, samples_ - 1.0));
   before = look(line, i);
+  // Where lines bend, the first look tells how many samples the guess was off.
+  const double off = std::floor(-before.beside / forwards_);
+  if (std::abs(off) > 1) {
+    i = static_cast<std::int32_t>(std::clamp(i + off, 0.0, samples_ - 1.0));
+    before = look(line, i);
+  }
   if (before.beside > 0) {
     do {
       after = before;
@@ -48,7 +54,15 @@ std::int32_t RayClimb::last_before(std::int32_t line, Seen2d& before, Seen2d& af
   return i;
 }
 
-double RayClimb::slope_at(std::int32_t line) const {
+std::optional<double> RayClimb::slope_at(std::int32_t line) const {
+  const std::int32_t lead = line - outwards_;
+  if (lead < 0 || lead >= (over_columns_ ? grid_.columns() : grid_.rows())) return {};
+  const auto passes_by_end = [&](std::int32_t last) { return last < 1 || last + 2 >= samples_; };
+  Seen2d before{}, after{}, lead_before{}, lead_after{};
+  const std::int32_t here = last_before(line, before, after);
+  if (passes_by_end(here)) return {};
+  const std::int32_t there = last_before(lead, lead_before, lead_after);
+  if (passes_by_end(there)) return {};
   double most = -std::numeric_limits<double>::infinity();
   const auto meet = [&](const Seen2d& u, const Seen2d& v) {
     const double share = u.beside / (u.beside - v.beside);
@@ -56,17 +70,7 @@ double RayClimb::slope_at(std::int32_t line) const {
     const double rise_m = u.rise_m + share * (v.rise_m - u.rise_m);
     most = std::max(most, rise_m / forwards);
   };
-  Seen2d before{}, after{};
-  const std::int32_t here = last_before(line, before, after);
-  // Beyond a line's ends the ray may pass over its last sample and nothing else.
-  if (here >= 0 && here + 1 < samples_)
-    meet(before, after);
-  else if (here >= 0 && before.beside == 0)
-    most = before.rise_m / before.forwards;
-  const std::int32_t lead = line - outwards_;
-  if (lead < 0 || lead >= (over_columns_ ? grid_.columns() : grid_.rows())) return most;
-  Seen2d lead_before{}, lead_after{};
-  const std::int32_t there = last_before(lead, lead_before, lead_after);
+  meet(before, after);
   for (std::int32_t i = std::min(here, there) + 1; i <= std::max(here, there); ++i) {
     const Seen2d u = look(line, i), v = look(lead, i);
     if (u.beside != v.beside) meet(u, v);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "core/terrain/ground_grid.h"
 #include "core/viewshed/plan_frame.h"
@@ -28,8 +29,9 @@ class RayClimb {
            int outwards, double forwards, double sideways);
 
   /// Greatest rise over forwards of the ground where the ray crosses a line and the segments that
-  /// lead to it from the line before it.
-  double slope_at(std::int32_t line) const;
+  /// lead to it from the line before it. Nothing where the ray passes by the end of a line, because
+  /// measuring does not tell whether it meets the last sample.
+  std::optional<double> slope_at(std::int32_t line) const;
 
  private:
   struct Seen2d {

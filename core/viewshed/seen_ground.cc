@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "core/occlusion/splitmix64.h"
@@ -9,12 +10,17 @@
 
 namespace scarp {
 
-std::vector<SamplePlace> choose_samples(const GroundGrid& grid, std::uint64_t count,
-                                        std::uint64_t seed) {
-  std::uint64_t left = 0;
+std::uint64_t count_known(const GroundGrid& grid) {
+  std::uint64_t known = 0;
   for (std::int32_t row = 0; row < grid.rows(); ++row)
     for (std::int32_t column = 0; column < grid.columns(); ++column)
-      left += grid.is_known(column, row) ? 1 : 0;
+      known += grid.is_known(column, row) ? 1 : 0;
+  return known;
+}
+
+std::vector<SamplePlace> choose_samples(const GroundGrid& grid, std::uint64_t count,
+                                        std::uint64_t seed) {
+  std::uint64_t left = count_known(grid);
   std::uint64_t wanted = std::min(count, left);
   std::vector<SamplePlace> chosen;
   chosen.reserve(wanted);
@@ -52,12 +58,14 @@ double cell_area_m2(const GroundGrid& grid, const std::optional<EarthFrame>& ear
 
 SeenGround::SeenGround(const GroundGrid& grid)
     : columns_(static_cast<std::size_t>(grid.columns())),
-      area_m2_(columns_ * static_cast<std::size_t>(grid.rows()), 0) {
-  for (std::int32_t row = 0; row < grid.rows(); ++row)
-    for (std::int32_t column = 0; column < grid.columns(); ++column)
-      if (!grid.is_known(column, row))
-        area_m2_[static_cast<std::size_t>(row) * columns_ + static_cast<std::size_t>(column)] =
-            std::numeric_limits<double>::quiet_NaN();
+      area_m2_(columns_ * static_cast<std::size_t>(grid.rows())) {
+  parallel_for(static_cast<std::size_t>(grid.rows()), [&](std::size_t row) {
+    for (std::size_t column = 0; column < columns_; ++column)
+      area_m2_[row * columns_ + column] =
+          grid.is_known(static_cast<std::int32_t>(column), static_cast<std::int32_t>(row))
+              ? 0
+              : std::numeric_limits<double>::quiet_NaN();
+  });
 }
 
 void SeenGround::add(const SampleWindow& window, std::span<const Seen> sight, double area_m2) {
@@ -71,12 +79,18 @@ void SeenGround::add(const SampleWindow& window, std::span<const Seen> sight, do
       });
 }
 
-std::vector<float> SeenGround::areas_km2(double share) const {
-  std::vector<float> areas(area_m2_.size());
+std::span<const float> SeenGround::finish_km2(double share) {
   constexpr double kM2PerKm2 = 1e6;
-  std::transform(area_m2_.begin(), area_m2_.end(), areas.begin(),
-                 [&](double m2) { return static_cast<float>(m2 / share / kM2PerKm2); });
-  return areas;
+  auto* bytes = reinterpret_cast<std::byte*>(area_m2_.span().data());
+  for (std::size_t i = 0; i < area_m2_.size(); ++i) {
+    double m2;
+    std::memcpy(&m2, bytes + i * sizeof(double), sizeof(double));
+    const auto km2 = static_cast<float>(m2 / share / kM2PerKm2);
+    std::memcpy(bytes + i * sizeof(float), &km2, sizeof(float));
+    constexpr std::size_t kAtOnce = std::size_t{1} << 18;
+    if (i % kAtOnce == 0) relieve_large_memory();
+  }
+  return {reinterpret_cast<const float*>(bytes), area_m2_.size()};
 }
 
 }  // namespace scarp

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/geodesy/earth_frame.h"
+#include "core/memory/large_array.h"
 #include "core/terrain/ground_grid.h"
 #include "core/viewshed/grid_sight.h"
 #include "core/viewshed/view_limits.h"
@@ -16,6 +17,8 @@ namespace scarp {
 struct SamplePlace {
   std::int32_t column = 0, row = 0;
 };
+
+std::uint64_t count_known(const GroundGrid& grid);
 
 /// Known samples of a raster: all of them in order where there are no more than `count`, otherwise
 /// so many, each set of them as likely as any other.
@@ -40,13 +43,14 @@ class SeenGround {
   explicit SeenGround(const GroundGrid& grid);
   /// @param sight  what a sample of ground of area_m2 has of targets at eye height
   void add(const SampleWindow& window, std::span<const Seen> sight, double area_m2);
+  /// Ends the sums, in whose memory the answer lies: nothing can be added afterwards.
   /// @return [rows * columns] square kilometres seen; NaN where void
   /// @param share  of the known samples that have looked, (0, 1]
-  std::vector<float> areas_km2(double share) const;
+  std::span<const float> finish_km2(double share);
 
  private:
   std::size_t columns_;
-  std::vector<double> area_m2_;
+  LargeArray<double> area_m2_;
 };
 
 }  // namespace scarp

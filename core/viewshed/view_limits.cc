@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/memory/large_array.h"
 #include "core/viewshed/plan_frame.h"
 
 namespace scarp {
@@ -158,8 +159,11 @@ SampleWindow reach_window(const GroundGrid& grid, const Position& eye, const Eye
     bool holds = true;
     for (std::int32_t c = window.first_column; holds && c <= window.last_column; ++c)
       holds = out_of_reach(c, window.first_row) && out_of_reach(c, window.last_row);
-    for (std::int32_t r = window.first_row; holds && r <= window.last_row; ++r)
+    for (std::int32_t r = window.first_row; holds && r <= window.last_row; ++r) {
       holds = out_of_reach(window.first_column, r) && out_of_reach(window.last_column, r);
+      constexpr std::int32_t kRowsAtOnce = 64;  // each with pages of its own
+      if (r % kRowsAtOnce == 0) relieve_large_memory();
+    }
     if (!holds) continue;
     return {std::max(window.first_column, 0), std::max(window.first_row, 0),
             std::min(window.last_column, whole.last_column),

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
+#include "core/threads/for_each_target.h"
 #include "core/threads/parallel_for.h"
 #include "core/viewshed/tin_viewshed.h"
 
@@ -93,6 +95,24 @@ float within_limits(const GroundGrid& grid, const EyeBearings& bearings, const V
              : std::numeric_limits<float>::quiet_NaN();
 }
 
+/// Requires fewer than 2^31 samples.
+SCARP_FOR_EACH_TARGET
+SeenTotals count_piece(std::span<const Seen> sight) {
+  const auto* values = reinterpret_cast<const std::uint8_t*>(sight.data());
+  constexpr auto kVisible = static_cast<std::uint8_t>(Seen::kVisible);
+  constexpr auto kUnknown = static_cast<std::uint8_t>(Seen::kUnknown);
+  std::int32_t visible = 0, unknown = 0;
+  for (std::size_t i = 0; i < sight.size(); ++i) {
+    visible += values[i] == kVisible ? 1 : 0;
+    unknown += values[i] == kUnknown ? 1 : 0;
+  }
+  SeenTotals totals;
+  totals.visible = static_cast<std::uint64_t>(visible);
+  totals.unknown = static_cast<std::uint64_t>(unknown);
+  totals.hidden = sight.size() - totals.visible - totals.unknown;
+  return totals;
+}
+
 }  // namespace
 
 SampleWindow heights_from(const ViewGround& ground, const std::optional<EarthFrame>& earth,
@@ -105,8 +125,7 @@ SampleWindow heights_from(const ViewGround& ground, const std::optional<EarthFra
     tin_heights(*ground.tin, grid, eye.position, window, least_m);
     found = all_judged(window);
   } else {
-    found = sweep_heights(ground.obstacles ? *ground.obstacles : grid, eye.position, window,
-                          least_m, &grid);
+    found = sweep_heights(ground.swept(), eye.position, window, least_m);
   }
   if (counts) *counts = found;
   for_rows(window, [&](std::int32_t row) {
@@ -125,8 +144,8 @@ void LeastHeight::lower(const ViewGround& ground, const std::optional<EarthFrame
                         const ViewshedEye& eye, SweepCounts* counts) {
   const GroundGrid& grid = ground.stands;
   if (ground.tin) {
-    std::vector<float> own_m(least_m_.size());
-    add(heights_from(ground, earth, eye, own_m, counts), own_m);
+    LargeArray<float> own_m(least_m_.size());
+    add(heights_from(ground, earth, eye, own_m.span(), counts), own_m.span());
     return;
   }
   const EyeBearings bearings(eye.position, earth);
@@ -135,15 +154,23 @@ void LeastHeight::lower(const ViewGround& ground, const std::optional<EarthFrame
     limit = [&](std::int32_t column, std::int32_t row, float least_m) {
       return within_limits(grid, bearings, eye.limits, column, row, least_m);
     };
-  const SweepCounts found = lower_heights(ground.obstacles ? *ground.obstacles : grid, eye.position,
-                                          window_of(grid, eye, bearings), limit, least_m_, &grid);
+  SweptGround swept = ground.swept();
+  swept.least_tops = &tops_;
+  const SweepCounts found =
+      lower_heights(swept, eye.position, window_of(grid, eye, bearings), limit, least_m_.span());
   if (counts) *counts = found;
 }
 
 LeastHeight::LeastHeight(const GroundGrid& grid)
     : columns_(static_cast<std::size_t>(grid.columns())),
-      least_m_(columns_ * static_cast<std::size_t>(grid.rows()),
-               std::numeric_limits<float>::quiet_NaN()) {}
+      least_m_(columns_ * static_cast<std::size_t>(grid.rows())),
+      tops_(grid) {
+  for_rows(whole_window(grid), [&](std::int32_t row) {
+    std::fill_n(least_m_.span().begin() +
+                    static_cast<std::ptrdiff_t>(static_cast<std::size_t>(row) * columns_),
+                columns_, std::numeric_limits<float>::quiet_NaN());
+  });
+}
 
 void LeastHeight::add(const SampleWindow& window, std::span<const float> least_m) {
   for_rows(window, [&](std::int32_t row) {
@@ -164,12 +191,26 @@ SampleWindow view_from(const ViewGround& ground, const std::optional<EarthFrame>
     tin_viewshed(*ground.tin, grid, eye.position, eye.target_height_m, window, sight);
     found = all_judged(window);
   } else {
-    found = sweep_viewshed(ground.obstacles ? *ground.obstacles : grid, eye.position,
-                           eye.target_height_m, window, sight, &grid);
+    found = sweep_viewshed(ground.swept(), eye.position, eye.target_height_m, window, sight);
   }
   if (counts) *counts = found;
   if (eye.limits.any()) keep_within(grid, bearings, eye, window, sight);
   return window;
+}
+
+SeenTotals count_seen(std::span<const Seen> sight) {
+  constexpr std::size_t kPiece = std::size_t{1} << 20;
+  std::vector<SeenTotals> totals((sight.size() + kPiece - 1) / kPiece);
+  parallel_for(totals.size(), [&](std::size_t i) {
+    totals[i] = count_piece(sight.subspan(i * kPiece, std::min(kPiece, sight.size() - i * kPiece)));
+  });
+  SeenTotals sum;
+  for (const SeenTotals& piece : totals) {
+    sum.visible += piece.visible;
+    sum.hidden += piece.hidden;
+    sum.unknown += piece.unknown;
+  }
+  return sum;
 }
 
 AnyEye::AnyEye(const GroundGrid& grid)

@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "core/geodesy/earth_frame.h"
+#include "core/memory/large_array.h"
 #include "core/sight/tin_index.h"
 #include "core/terrain/ground_grid.h"
 #include "core/viewshed/grid_sight.h"
@@ -41,16 +41,25 @@ struct ViewGround {
     return ground;
   }
 
+  /// Of grids: what a sweep takes.
+  SweptGround swept() const {
+    SweptGround swept(obstacles ? *obstacles : stands, stands);
+    swept.tops = tops;
+    return swept;
+  }
+
   const GroundGrid& stands;
   const GroundGrid* obstacles = nullptr;
   const TinIndex* tin = nullptr;
+  /// Of what swept() has, for many eyes: measured once. Null: measured by each.
+  const GroundTops* tops = nullptr;
 };
 
 /// What one eye sees within its limits, exactly what GridSight or line_of_sight judges.
 /// @param earth        of the grid's frame; nothing where it is flat
 /// @param sight[out]   [rows * columns]; only the window returned is written
 /// @return the window within reach; outside it nothing is within the limits
-/// Cost: see PartSweep; with limits besides distance, a bearing for each sample seen.
+/// Cost: see part_sweep.h; with limits besides distance, a bearing for each sample seen.
 SampleWindow view_from(const ViewGround& ground, const std::optional<EarthFrame>& earth,
                        const ViewshedEye& eye, std::span<Seen> sight,
                        SweepCounts* counts = nullptr);
@@ -63,6 +72,12 @@ SampleWindow heights_from(const ViewGround& ground, const std::optional<EarthFra
                           const ViewshedEye& eye, std::span<float> least_m,
                           SweepCounts* counts = nullptr);
 
+/// How many samples an eye has how.
+struct SeenTotals {
+  std::uint64_t visible = 0, hidden = 0, unknown = 0;
+};
+SeenTotals count_seen(std::span<const Seen> sight);
+
 /// Seen by any of the eyes so far: visible where one sees it, otherwise unknown where that
 /// holds for one.
 class AnyEye {
@@ -70,11 +85,11 @@ class AnyEye {
   /// Nothing seen yet: hidden, and unknown where void.
   explicit AnyEye(const GroundGrid& grid);
   void add(const SampleWindow& window, std::span<const Seen> sight);
-  std::span<const Seen> seen() const { return sight_; }
+  std::span<const Seen> seen() const { return sight_.span(); }
 
  private:
   std::size_t columns_;
-  std::vector<Seen> sight_;
+  LargeArray<Seen> sight_;
 };
 
 /// By how many of the eyes so far a sample is seen for certain.
@@ -84,11 +99,11 @@ class EyeCount {
 
   explicit EyeCount(const GroundGrid& grid);
   void add(const SampleWindow& window, std::span<const Seen> sight);
-  std::span<const std::uint32_t> counts() const { return counts_; }
+  std::span<const std::uint32_t> counts() const { return counts_.span(); }
 
  private:
   std::size_t columns_;
-  std::vector<std::uint32_t> counts_;
+  LargeArray<std::uint32_t> counts_;
 };
 
 /// The least height so far, over the eyes that have one; NaN where none has.
@@ -100,12 +115,13 @@ class LeastHeight {
   void lower(const ViewGround& ground, const std::optional<EarthFrame>& earth,
              const ViewshedEye& eye, SweepCounts* counts = nullptr);
   void add(const SampleWindow& window, std::span<const float> least_m);
-  std::span<float> heights_m() { return least_m_; }
-  std::span<const float> heights_m() const { return least_m_; }
+  std::span<float> heights_m() { return least_m_.span(); }
+  std::span<const float> heights_m() const { return least_m_.span(); }
 
  private:
   std::size_t columns_;
-  std::vector<float> least_m_;
+  LargeArray<float> least_m_;
+  LeastTops tops_;
 };
 
 }  // namespace scarp

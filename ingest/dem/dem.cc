@@ -7,6 +7,7 @@
 #include <span>
 
 #include "core/error/error.h"
+#include "core/memory/large_array.h"
 #include "core/threads/parallel_for.h"
 #include "ingest/dem/dem_windows.h"
 #include "ingest/dem/ground_placement.h"
@@ -56,8 +57,16 @@ std::uint64_t read_rows_into(GroundGrid& grid, const Dem& dem, const RasterFile&
                     "reaches too far around the Earth for one frame (heights of 500 km and more); "
                     "a smaller piece was expected; cut it with gdal_translate -projwin");
     }
+    relieve_large_memory();
   }
   return known_count;
+}
+
+/// Is the budget too small for all in memory?
+bool is_tight(const Dem& dem, const DemOptions& options, double bytes_per_sample) {
+  const double needed = static_cast<double>(dem.columns) * dem.rows *
+                        (bytes_per_sample + options.more_bytes_per_sample);
+  return options.memory_budget_bytes && needed > static_cast<double>(options.memory_budget_bytes);
 }
 
 /// Refuses before allocating what will not fit.
@@ -65,13 +74,37 @@ void check_memory(const Dem& dem, const DemOptions& options, double bytes_per_sa
                   const std::string& file) {
   const double needed = static_cast<double>(dem.columns) * dem.rows *
                         (bytes_per_sample + options.more_bytes_per_sample);
-  if (options.memory_budget_bytes && needed > static_cast<double>(options.memory_budget_bytes))
+  if (is_tight(dem, options, bytes_per_sample))
     throw Error(ErrorCode::kResource,
                 fmt::format("'{}': {} x {} samples need about {:.1f} GiB, and --memory allows "
                             "{:.1f}; raise --memory, or cut the DEM with gdal_translate -projwin",
                             file, dem.columns, dem.rows, needed / (1 << 30),
                             static_cast<double>(options.memory_budget_bytes) / (1 << 30)));
 }
+/// What GDAL's cache has to hold so that no block is unpacked twice, in files that are read by
+/// bands of rows.
+double reading_bytes(const std::vector<RasterFile>& sources) {
+  double most = 0;
+  for (const RasterFile& source : sources) {
+    int block_columns = 1, block_rows = 1;
+    source.band->GetBlockSize(&block_columns, &block_rows);
+    most = std::max(most, static_cast<double>(block_rows) * (source.columns + block_columns) *
+                              GDALGetDataTypeSizeBytes(source.band->GetRasterDataType()));
+  }
+  constexpr double kLeast = 4e6;
+  return std::max(kLeast, thread_count() * most);
+}
+
+/// Makes room elsewhere, or refuses.
+void make_room(const Dem& dem, const DemOptions& options, const std::vector<RasterFile>& sources) {
+  if (!is_tight(dem, options, kBytesPerGroundSample)) return;
+  const double bytes = reading_bytes(sources);
+  if (options.make_room && options.make_room(static_cast<double>(dem.columns) * dem.rows, bytes))
+    GDALSetCacheMax64(static_cast<GIntBig>(bytes));
+  else
+    check_memory(dem, options, kBytesPerGroundSample, sources.front().file);
+}
+
 }  // namespace
 
 Dem read_dem(const std::vector<std::string>& files, const DemOptions& options,
@@ -92,7 +125,7 @@ Ground read_ground(const std::vector<std::string>& files, const DemOptions& opti
   Ground ground;
   Dem& dem = ground.dem;
   const std::vector<RasterFile> sources = open_mosaic(files, options, dem);
-  check_memory(dem, options, kBytesPerGroundSample, files.front());
+  make_room(dem, options, sources);
   ground.grid = GroundGrid(dem.columns, dem.rows, ground_placement(dem));
   std::uint64_t known = 0;
   for (std::size_t i = 0; i < sources.size(); ++i) {

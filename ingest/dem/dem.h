@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -23,6 +24,10 @@ struct DemOptions {
   std::optional<double> nodata;            ///< a value that stands for void, besides the file's
   std::uint64_t memory_budget_bytes = 0;   ///< 0: no limit
   double more_bytes_per_sample = 0;        ///< that the command takes besides, of the budget
+  /// Asked by read_ground, with the number of samples and the bytes that reading them takes
+  /// besides, where the budget is too small: whether room was made for the arrays elsewhere. Empty:
+  /// no.
+  std::function<bool(double samples, double reading_bytes)> make_room;
 };
 
 /// What a sample takes in memory from reading to the finished mesh: height, position, marks, and

@@ -15,6 +15,8 @@ DatasetPtr open_dataset(const std::string& file, unsigned int open_flags, const 
   std::call_once(registered, [] {
     // Reading must leave no .aux.xml beside the user's data.
     CPLSetConfigOption("GDAL_PAM_ENABLED", "NO");
+    // Rasters that are not packed go straight to their reader, without GDAL's cache of blocks.
+    CPLSetConfigOption("GTIFF_DIRECT_IO", "YES");
     GDALAllRegister();
   });
   // GDAL reports on stderr by itself unless the thread's handler is quiet; its words go into ours.

@@ -85,6 +85,13 @@ bool convert_to_metres(std::size_t count, const std::uint8_t* __restrict known, 
   return true;
 }
 
+/// Is any value within reach of another, or no number?
+bool any_near(std::span<const double> values, double to, double reach) {
+  std::int32_t any = 0;
+  for (const double value : values) any |= std::abs(value - to) > reach ? 0 : 1;
+  return any != 0;
+}
+
 }  // namespace
 
 HeightReader::HeightReader(const RasterFile& source, const DemOptions& options, bool on_earth)
@@ -110,17 +117,29 @@ void HeightReader::read_values(const SampleRect& rect, StoredValues& stored) con
   CPLErr result =
       source_.band->RasterIO(GF_Read, rect.first_column, rect.first_row, rect.columns, rect.rows,
                              stored.values.data(), rect.columns, rect.rows, GDT_Float64, 0, 0);
-  if (result == CE_None && has_mask_)
+  if (result == CE_None && has_mask_ && may_be_void(stored.values))
     result = source_.band->GetMaskBand()->RasterIO(GF_Read, rect.first_column, rect.first_row,
                                                    rect.columns, rect.rows, stored.mask.data(),
                                                    rect.columns, rect.rows, GDT_Byte, 0, 0);
   const std::string reason = CPLGetLastErrorMsg();
   CPLPopErrorHandler();
   if (result != CE_None)
-    refuse_file(source_.file,
-                fmt::format("cannot be read at row {} of {} ({}); the whole raster was "
-                            "expected; is the file complete?",
-                            rect.first_row, source_.rows, reason));
+    refuse_file(
+        source_.file,
+        fmt::format("cannot be read at row {} of {} ({}); the whole raster was "
+                    "expected; is the file complete?",
+                    rect.first_row, source_.rows, reason.empty() ? "too few bytes" : reason));
+}
+
+bool HeightReader::may_be_void(std::span<const double> values) const {
+  const GDALDataType type = source_.band->GetRasterDataType();
+  if (source_.band->GetMaskFlags() != GMF_NODATA || type == GDT_Int64 || type == GDT_UInt64)
+    return true;
+  const double nodata = source_.band->GetNoDataValue();
+  // GDAL takes values for equal that differ in their last bits.
+  constexpr double kNearly = 1e-4;
+  return std::isnan(nodata) ? any_near(values, 0.0, -1.0)
+                            : any_near(values, nodata, kNearly * std::abs(nodata));
 }
 
 void HeightReader::to_metres(std::int32_t column, std::int32_t row, std::span<double> values,

@@ -42,6 +42,9 @@ class HeightReader {
                  std::span<std::uint8_t> mask) const;
 
  private:
+  /// Can the mask differ from "all known"? Where it stands for a nodata value only, it is as costly
+  /// as the heights, and mostly nothing is near that value.
+  bool may_be_void(std::span<const double> values) const;
   /// Refuses a stored value that is no height.
   void check_height(double value, std::int32_t column, std::int32_t row) const;
 

@@ -1,7 +1,9 @@
 #include <fmt/format.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -14,11 +16,12 @@
 #include "tests/support/temp_folder.h"
 
 /// Whole commands on the same files, one after the other and again, medians and ratios, over Big
-/// Tujunga refined to SIDE x SIDE samples.
+/// Tujunga refined to SIDE x SIDE samples. Wall time, and the processors' time (user and system),
+/// which other work on the machine disturbs less.
 ///   viewshed_bench [REPEATS (5) [SIDE ... (1024 2048 4096 8192)]]
 ///     an eye 2 m over the middle: `scarp viewshed` on the flat earth and on the ellipsoid against
 ///     `gdal_viewshed` and, alone in its time without reading the file, GRASS's `r.viewshed` (flat;
-///     once, and only up to 2048, because it takes minutes beyond)
+///     once, and only up to 4096, because it takes many minutes beyond)
 ///   viewshed_bench eyes [COUNT (500) [SIDE (4096) [REPEATS (3)]]]
 ///     COUNT eyes drawn at random, `--mode ground` within 30 km as one run, by the eye, against
 ///     `gdal_viewshed -om GROUND` of one of them
@@ -38,40 +41,63 @@ std::string refined(const std::string& dem, int side, const test::TempFolder& fo
   return path;
 }
 
+struct Cost {
+  double wall_s = 0, cpu_s = 0;
+};
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
 struct Command {
   const char* name;
   std::string line;
-  std::vector<double> seconds;
+  std::vector<double> wall_s, cpu_s;
 
-  double median() const {
-    std::vector<double> sorted = seconds;
-    std::sort(sorted.begin(), sorted.end());
-    return sorted[sorted.size() / 2];
+  void add(const Cost& cost) {
+    wall_s.push_back(cost.wall_s);
+    cpu_s.push_back(cost.cpu_s);
   }
+  Cost middle() const { return {median(wall_s), median(cpu_s)}; }
 };
 
-double seconds_of(const std::string& line) {
-  const auto start = std::chrono::steady_clock::now();
-  if (std::system((line + " > /dev/null").c_str()) != 0) std::exit(1);
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+/// What all commands so far have taken of the processors.
+double cpu_so_far_s() {
+  rusage used{};
+  getrusage(RUSAGE_CHILDREN, &used);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return seconds(used.ru_utime) + seconds(used.ru_stime);
 }
 
-/// Seconds that r.viewshed takes on a file, without reading it; nothing without GRASS.
-std::optional<double> grass_seconds(const std::string& file, const test::TempFolder& folder) {
+Cost cost_of(const std::string& line) {
+  const double cpu_before_s = cpu_so_far_s();
+  const auto start = std::chrono::steady_clock::now();
+  if (std::system((line + " > /dev/null").c_str()) != 0) std::exit(1);
+  return {std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(),
+          cpu_so_far_s() - cpu_before_s};
+}
+
+/// What r.viewshed takes on a file, without reading it; nothing without GRASS.
+std::optional<Cost> grass_cost(const std::string& file, const test::TempFolder& folder) {
   if (std::system("command -v grass > /dev/null") != 0) return {};
   const std::string script = folder.path("grass.sh"), time = folder.path("grass.time");
   std::ofstream(script) << "set -e\nr.in.gdal -o --quiet input='" << file
                         << "' output=dem\ng.region raster=dem\nstart=$(date +%s.%N)\n"
-                           "r.viewshed -b --quiet input=dem output=seen "
-                           "coordinates=394253,3798287 observer_elevation=2 memory=8000\n"
-                           "echo $start $(date +%s.%N) > '"
+                           "TIMEFORMAT='%U %S'\n"
+                           "used=$( { time r.viewshed -b --quiet input=dem output=seen "
+                           "coordinates=394253,3798287 observer_elevation=2 memory=8000 "
+                           "> /dev/null 2>&1; } 2>&1 )\n"
+                           "echo $start $(date +%s.%N) $used > '"
                         << time << "'\n";
   const std::string line =
       fmt::format("grass --tmp-location '{}' --exec bash '{}' > /dev/null 2>&1", file, script);
   if (std::system(line.c_str()) != 0) return {};
-  double start = 0, end = 0;
-  std::ifstream(time) >> start >> end;
-  return end - start;
+  double start = 0, end = 0, user_s = 0, system_s = 0;
+  std::ifstream(time) >> start >> end >> user_s >> system_s;
+  return Cost{end - start, user_s + system_s};
 }
 
 void compare(const std::string& scarp, const std::string& dem, int side, int repeats) {
@@ -84,25 +110,33 @@ void compare(const std::string& scarp, const std::string& dem, int side, int rep
       {"gdal_viewshed",
        fmt::format("gdal_viewshed -q -ox 394253 -oy 3798287 -oz 2 -md 0 -cc 0 '{}' '{}'", file,
                    folder.path("gdal.tif")),
+       {},
        {}},
-      {"scarp flat", ours + " flat", {}},
-      {"scarp ellipsoid", ours + " ellipsoid", {}}};
+      {"scarp flat", ours + " flat", {}, {}},
+      {"scarp ellipsoid", ours + " ellipsoid", {}, {}}};
   for (int i = 0; i <= repeats; ++i) {
     for (Command& command : commands) {
-      const double seconds = seconds_of(command.line);
-      if (i > 0) command.seconds.push_back(seconds);  // the first round warms the caches
+      const Cost cost = cost_of(command.line);
+      if (i > 0) command.add(cost);  // the first round warms the caches
     }
   }
-  constexpr int kGreatestForGrass = 2048;
+  constexpr int kGreatestForGrass = 4096;
   if (side <= kGreatestForGrass)
-    if (const auto seconds = grass_seconds(file, folder))
-      commands.push_back({"r.viewshed", "", {*seconds}});
-  for (const Command& command : commands)
-    fmt::print("{:>5} x {:<5} {:<16} {:7.3f} s   {:5.2f} of gdal_viewshed   {:6.1f} ns a cell\n",
-               side, side, command.name, command.median(), command.median() / commands[0].median(),
-               1e9 * command.median() / side / side);
-  fmt::print("{:>5} x {:<5} ellipsoid {:.2f} of flat\n", side, side,
-             commands[2].median() / commands[1].median());
+    if (const auto cost = grass_cost(file, folder))
+      commands.push_back({"r.viewshed", "", {cost->wall_s}, {cost->cpu_s}});
+  const Cost gdal = commands[0].middle(), flat = commands[1].middle(),
+             ellipsoid = commands[2].middle();
+  for (const Command& command : commands) {
+    const Cost cost = command.middle();
+    fmt::print(
+        "{:>5} x {:<5} {:<16} wall {:7.3f} s, {:6.2f} of gdal_viewshed   processors {:7.3f} s, "
+        "{:6.2f} of it   {:6.1f} ns a cell\n",
+        side, side, command.name, cost.wall_s, cost.wall_s / gdal.wall_s, cost.cpu_s,
+        cost.cpu_s / gdal.cpu_s, 1e9 * cost.wall_s / side / side);
+  }
+  fmt::print("{:>5} x {:<5} ellipsoid {:.2f} of flat (processors {:.2f})\n", side, side,
+             ellipsoid.wall_s / flat.wall_s, ellipsoid.cpu_s / flat.cpu_s);
+  std::fflush(stdout);
 }
 
 void compare_eyes(const std::string& scarp, const std::string& dem, int count, int side,
@@ -123,22 +157,27 @@ void compare_eyes(const std::string& scarp, const std::string& dem, int count, i
   Command one{"gdal_viewshed",
               fmt::format("gdal_viewshed -q -om GROUND -md 30000 {} -oz 2 -cc 0 '{}' '{}'", first,
                           file, folder.path("gdal.tif")),
+              {},
               {}};
   Command all{"scarp",
               fmt::format("'{}' viewshed '{}' --observers '{}' --mode ground --max-distance 30000 "
                           "-o '{}' --overwrite",
                           scarp, file, eyes, folder.path("scarp.tif")),
+              {},
               {}};
-  seconds_of(one.line);
+  cost_of(one.line);
   for (int i = 0; i < repeats; ++i) {
-    one.seconds.push_back(seconds_of(one.line));
-    all.seconds.push_back(seconds_of(all.line) / count);
-    one.seconds.push_back(seconds_of(one.line));
+    one.add(cost_of(one.line));
+    const Cost cost = cost_of(all.line);
+    all.add({cost.wall_s / count, cost.cpu_s / count});
+    one.add(cost_of(one.line));
   }
+  const Cost ours = all.middle(), theirs = one.middle();
   fmt::print(
-      "{} x {}, {} eyes: scarp {:.3f} s an eye, gdal_viewshed -om GROUND {:.3f} s for one, {:.2f} "
-      "of it\n",
-      side, side, count, all.median(), one.median(), all.median() / one.median());
+      "{} x {}, {} eyes: scarp {:.3f} s an eye (processors {:.3f}), gdal_viewshed -om GROUND "
+      "{:.3f} s for one ({:.3f}): {:.2f} of it ({:.2f})\n",
+      side, side, count, ours.wall_s, ours.cpu_s, theirs.wall_s, theirs.cpu_s,
+      ours.wall_s / theirs.wall_s, ours.cpu_s / theirs.cpu_s);
 }
 
 }  // namespace

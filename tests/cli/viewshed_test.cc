@@ -125,6 +125,20 @@ TEST_F(ViewshedCommand, EyesFromAFile) {
   EXPECT_EQ(read("each/east_1.tif")[5], 0);
 }
 
+TEST_F(ViewshedCommand, EyesOfOneNameHaveARasterEach) {
+  std::ofstream(folder_.path("eyes.csv")) << "name,x,y\nmast,500150,3999850\nmast,501150,3999850\n";
+  std::filesystem::create_directory(folder_.path("each"));
+  const std::string options =
+      "--observers " + folder_.path("eyes.csv") + " --each " + folder_.path("each");
+  ASSERT_EQ(view(options).exit_code, 0);
+  EXPECT_EQ(read("each/mast.tif")[11], 0);
+  EXPECT_EQ(read("each/mast_2.tif")[11], 1);
+  // What is there already shows before the work.
+  std::filesystem::remove(folder_.path("out.tif"));
+  EXPECT_NE(view(options).errors.find("mast.tif': exists"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder_.path("out.tif")));
+}
+
 TEST_F(ViewshedCommand, ObstaclesHideTheGroundUnderAndBehindThem) {
   const std::string hedged = write_dem("dsm.tif", kColumns, 10);
   const std::string eye = "--observer 501150,3999850";
@@ -202,6 +216,59 @@ TEST_F(ViewshedCommand, SceneIsSeenAsItsLayerIs) {
             0);
 }
 
+/// Where memory is short the arrays are on the disk: the same raster, and the bound holds.
+TEST_F(ViewshedCommand, KeepsToItsMemory) {
+  constexpr int kSide = 3600;
+  constexpr std::uint64_t kAllowed = 125ULL << 20;
+  const std::string dem = folder_.path("large.tif");
+  {
+    const GDALDatasetUniquePtr file(GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
+        dem.c_str(), kSide, kSide, 1, GDT_Int16, nullptr));
+    std::vector<std::int16_t> heights(kSide);
+    for (int r = 0; r < kSide; ++r) {
+      for (int c = 0; c < kSide; ++c)
+        heights[static_cast<std::size_t>(c)] =
+            static_cast<std::int16_t>(200 * std::sin(c * 0.01) * std::cos(r * 0.013) + c % 7);
+      ASSERT_EQ(file->GetRasterBand(1)->RasterIO(GF_Write, 0, r, kSide, 1, heights.data(), kSide, 1,
+                                                 GDT_Int16, 0, 0),
+                CE_None);
+    }
+  }
+  const auto run = [&](const std::string& options, const std::string& output) {
+    return run_scarp("$SCARP viewshed " + dem + " --observer 1800.5,1799.5,30 --json -o " +
+                     folder_.path(output) + " " + options);
+  };
+  const auto pixels = [&](const std::string& output) {
+    const GDALDatasetUniquePtr file(
+        GDALDataset::Open(folder_.path(output).c_str(), GDAL_OF_RASTER));
+    std::vector<std::uint32_t> values(static_cast<std::size_t>(kSide) * kSide);
+    EXPECT_NE(file, nullptr);
+    EXPECT_STREQ(file->GetMetadataItem("LAYOUT", "IMAGE_STRUCTURE"), "COG");
+    EXPECT_EQ(file->GetRasterBand(1)->RasterIO(GF_Read, 0, 0, kSide, kSide, values.data(), kSide,
+                                               kSide, GDT_UInt32, 0, 0),
+              CE_None);
+    return values;
+  };
+  for (const std::string mode : {"visible", "count"}) {
+    const std::string plain = mode + ".tif", short_of_memory = mode + "_short.tif";
+    const RunResult all = run("--mode " + mode, plain);
+    ASSERT_EQ(all.exit_code, 0) << all.errors;
+    const RunResult few = run("--memory 125M --mode " + mode, short_of_memory);
+    ASSERT_EQ(few.exit_code, 0) << few.errors;
+    const json stages = json::parse(few.output)["stages"];
+    for (const json& stage : stages)
+      EXPECT_LE(stage["peak_bytes"].get<std::uint64_t>(), kAllowed) << stage["name"];
+    EXPECT_EQ(pixels(short_of_memory), pixels(plain));
+  }
+  // Not enough for blocks either.
+  const RunResult none = run("--memory 40M", "none.tif");
+  EXPECT_EQ(none.exit_code, 1);
+  EXPECT_NE(none.errors.find("--memory"), std::string::npos) << none.errors;
+  EXPECT_FALSE(std::filesystem::exists(folder_.path("none.tif")));
+  for (const auto& entry : std::filesystem::directory_iterator(folder_.path("")))
+    EXPECT_EQ(entry.path().filename().string().find("scratch"), std::string::npos);
+}
+
 TEST_F(ViewshedCommand, RefusesInOneLineAndLeavesNothing) {
   const auto refused = [&](const std::string& options, int code, const std::string& words) {
     const RunResult result = view(options);
@@ -218,6 +285,9 @@ TEST_F(ViewshedCommand, RefusesInOneLineAndLeavesNothing) {
   refused(std::string(kEye) + " --azimuth 5", 2, "--azimuth");
   refused(std::string(kEye) + " --min-distance 50 --max-distance 20", 2, "--min-distance");
   refused(std::string(kEye) + " --each " + folder_.path("nowhere"), 1, "folder");
+  refused(std::string(kEye) + " --overwrite --polygons " + folder_.path("out.tif"), 2, "twice");
+  refused(std::string(kEye) + " --overwrite --polygons " + dem_, 2, "twice");
+  EXPECT_TRUE(std::filesystem::exists(dem_));
   refused("--observer 500150,3999450,1000asl --crs EPSG:0", 1, "EPSG:0");
   refused("--total " + std::string(kEye), 2, "--observer does not go with --total");
   refused("--total --azimuth 1,2", 2, "--azimuth");

@@ -190,8 +190,8 @@ TEST(ObstaclesOnTheEllipsoid, SweepEqualsJudge) {
       const Position eye = ground.raised(at.column, at.row, eye_m);
       const GridSight judge(obstacles, eye);
       for (const double target_m : {0.0, 1.5}) {
-        sweep_viewshed(obstacles, eye, target_m, whole_window(ground), seen, &ground);
-        sweep_heights(obstacles, eye, whole_window(ground), least_m, &ground);
+        sweep_viewshed({obstacles, ground}, eye, target_m, whole_window(ground), seen);
+        sweep_heights({obstacles, ground}, eye, whole_window(ground), least_m);
         for (std::size_t i = 0; i < seen.size(); ++i) {
           const auto c = static_cast<std::int32_t>(i % columns),
                      r = static_cast<std::int32_t>(i / columns);

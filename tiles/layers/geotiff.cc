@@ -7,11 +7,13 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cstdlib>
 #include <filesystem>
 #include <system_error>
 #include <vector>
 
 #include "core/error/error.h"
+#include "core/memory/large_array.h"
 #include "core/threads/parallel_for.h"
 #include "tiles/layers/gdal_session.h"
 #include "tiles/layers/spatial_reference.h"
@@ -100,6 +102,45 @@ void check_size(const std::string& built, GDALDataset& source, const std::string
                             path, unknown ? 0 : size, bytes));
 }
 
+/// The same for packed blocks: does the file hold all of them?
+void check_blocks(const std::string& built, const std::string& path) {
+  const GDALDatasetUniquePtr file(GDALDataset::Open(built.c_str(), GDAL_OF_RASTER));
+  std::error_code unknown;
+  const auto size = std::filesystem::file_size(built, unknown);
+  const auto number = [](GDALRasterBand& band, const char* what, int x, int y) {
+    const char* text =
+        band.GetMetadataItem(fmt::format("BLOCK_{}_{}_{}", what, x, y).c_str(), "TIFF");
+    return text == nullptr ? 0 : std::strtoull(text, nullptr, 10);
+  };
+  const auto is_whole = [&](GDALRasterBand& band) {
+    int width = 1, height = 1;
+    band.GetBlockSize(&width, &height);
+    for (int y = 0; y < (band.GetYSize() + height - 1) / height; ++y)
+      for (int x = 0; x < (band.GetXSize() + width - 1) / width; ++x) {
+        const auto bytes = number(band, "SIZE", x, y);
+        if (bytes == 0 || number(band, "OFFSET", x, y) + bytes > size) return false;
+      }
+    return true;
+  };
+  bool whole = file && !unknown;
+  for (int b = 1; whole && b <= file->GetRasterCount(); ++b) {
+    GDALRasterBand& band = *file->GetRasterBand(b);
+    whole = is_whole(band);
+    for (int i = 0; whole && i < band.GetOverviewCount(); ++i)
+      whole = is_whole(*band.GetOverview(i));
+  }
+  if (!whole)
+    throw Error(ErrorCode::kResource,
+                fmt::format("'{}': not all of it could be written; free space on the disk or write "
+                            "elsewhere",
+                            path));
+}
+
+int CPL_STDCALL relieve(double, const char*, void*) {
+  relieve_large_memory();
+  return TRUE;
+}
+
 void describe(GDALDataset& dataset, const RasterLayer& layer) {
   std::array<double, 6> geotransform = layer.geotransform;
   dataset.SetGeoTransform(geotransform.data());
@@ -130,7 +171,10 @@ void describe(GDALDataset& dataset, const RasterLayer& layer) {
 CPLStringList cog_options(bool is_packed, const char* predictor, const char* resampling) {
   CPLStringList options;
   options.SetNameValue("COMPRESS", is_packed ? "DEFLATE" : "NONE");
-  if (is_packed) options.SetNameValue("PREDICTOR", predictor);
+  if (is_packed) {
+    options.SetNameValue("PREDICTOR", predictor);
+    options.SetNameValue("LEVEL", "1");  // the most of what can be had, at a third of the time
+  }
   options.SetNameValue("BIGTIFF", "IF_SAFER");
   options.SetNameValue("NUM_THREADS", std::to_string(thread_count()).c_str());
   options.SetNameValue("OVERVIEW_RESAMPLING", resampling);
@@ -205,20 +249,24 @@ void write_geotiff_cog(const std::string& path, const RasterLayer& layer, Existi
     const OGRSpatialReference crs = spatial_reference(layer.crs_wkt, path);
     source->SetSpatialRef(&crs);
   }
-  build_overviews(*source, data);
+  if (!layer.saves_memory) build_overviews(*source, data);
   session.check(path);
   CPLStringList options =
       cog_options(!layer.is_bulky, data.predictor, data.is_float ? "AVERAGE" : "NEAREST");
   GDALDriver* driver = GetGDALDriverManager()->GetDriverByName("COG");
   if (driver == nullptr) session.fail(path);
-  const std::string built = layer.is_bulky ? file.part_path() : session.folder() + "/layer.tif";
+  const bool on_disk = layer.is_bulky || layer.saves_memory;
+  const std::string built = on_disk ? file.part_path() : session.folder() + "/layer.tif";
   GDALDatasetUniquePtr cog(
-      driver->CreateCopy(built.c_str(), source.get(), TRUE, options.List(), nullptr, nullptr));
+      driver->CreateCopy(built.c_str(), source.get(), TRUE, options.List(), relieve, nullptr));
   if (!cog) session.fail(path);
   cog.reset();  // closing writes the rest
   session.check(path);
-  if (layer.is_bulky) {
-    check_size(built, *source, path);
+  if (on_disk) {
+    if (layer.is_bulky)
+      check_size(built, *source, path);
+    else
+      check_blocks(built, path);
     file.take_over();
   } else {
     file.append(session.bytes_of(built, path));

@@ -38,6 +38,8 @@ struct RasterLayer {
   double scale = 1;                    ///< what a step of the numbers is worth, in the unit
   /// Many bands: not packed, and built on the disk instead of in memory.
   bool is_bulky = false;
+  /// Built on the disk, overviews as well, so that memory holds only blocks; slower.
+  bool saves_memory = false;
   std::string unit;              ///< such as "m"; empty: none
   std::optional<double> nodata;  ///< NaN is allowed for float
   /// Red, green, blue, alpha of the values from 0 on; for uint8 only, at most 256. Empty: none.
@@ -52,7 +54,7 @@ struct RasterLayer {
 /// Requires columns, rows >= 1, as many samples, colours only for uint8 (asserted).
 /// Errors: kResource with GDAL's own words or from the disk, kInput where the file exists and is
 /// not to be replaced, or the CRS is not WKT. Nothing is left behind. Memory: overviews (a third of
-/// the samples) and, unless bulky, the compressed file.
+/// the samples) and, unless bulky, the compressed file; blocks only where it saves memory.
 void write_geotiff_cog(const std::string& path, const RasterLayer& layer, Existing existing);
 
 /// Takes a rectangle of a layer's samples, [rows * columns], row by row from the north.

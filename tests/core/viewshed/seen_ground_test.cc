@@ -31,7 +31,7 @@ TEST(SeenGround, IsWhatEachPlaceSeesByItself) {
   for (const SamplePlace& place : all)
     back.add(whole_window(grid), seen_from(grid, place, kTargetM, kEyeM),
              cell_area_m2(grid, {}, place));
-  const std::vector<float> areas_km2 = back.areas_km2(1);
+  const std::span<const float> areas_km2 = back.finish_km2(1);
   int some = 0;
   for (std::int32_t r = 0; r < grid.rows(); ++r) {
     for (std::int32_t c = 0; c < grid.columns(); ++c) {

@@ -97,7 +97,7 @@ class KernelRun {
                                 0.1 * unit());
     const std::vector<float> s = drawn_floats(n, -0.2, 0.3), steep = drawn_floats(n, 0, 0.1);
     std::vector<float> place(bins + 1), shifted(bins + 1), even(bins + 1);
-    keep(near_even_places(bins + 1, n, t.data(), place.data()));
+    keep(near_even_places(0, bins + 1, n, t.data(), place.data()));
     keep(place);
     even_places(bins + 1, 0.97F, 2.3F, even.data());
     shift_places(bins + 1, place.data(), 0.25F, shifted.data());
