@@ -53,9 +53,12 @@ void add_build(CLI::App& app, BuildOptions& o, std::function<int()>& run) {
   CLI::App* c = app.add_subcommand("build", "Build a scene from one DEM or several");
   c->footer(
       "Example:\n  scarp build alps.tif -o alps.scene --max-error 5\n"
-      "Several DEMs that share their cells make one mosaic; later ones lie on top.");
-  c->add_option("dem", o.dem_files, "Any rasters that GDAL reads")->required();
-  c->add_option("-o,--output", o.scene, "The scene, a new folder")->required();
+      "Several DEMs that share their cells make one mosaic; later ones lie on top.\n"
+      "A build that was stopped goes on with the same command and --resume. For a queue of jobs:\n"
+      "  scarp build alps.tif -o alps.scene --plan plan.json   # writes the steps, does none\n"
+      "  scarp build --plan plan.json --step 7                 # does one, in the order it allows");
+  auto* dem = c->add_option("dem", o.dem_files, "Any rasters that GDAL reads");
+  auto* output = c->add_option("-o,--output", o.scene, "The scene, a new folder");
   auto* error = c->add_option("--max-error", o.max_error_m,
                               "Greatest height error of the mesh over its whole surface, metres; "
                               "a tenth of the cell size unless given");
@@ -126,6 +129,28 @@ void add_build(CLI::App& app, BuildOptions& o, std::function<int()>& run) {
                                       "Eye of layers/viewshed.tif, X,Y[,H]; 2 m above the highest "
                                       "sample unless given");
   c->add_option("--crs", o.crs, "CRS of --observer, such as OGC:CRS84; the DEM's unless given");
+  c->add_option(
+       "--tile-samples", o.tile_samples,
+       fmt::format("Cells along a side of a tile, a power of two from 64 on; a DEM that is "
+                   "no larger has one tile; {} unless given",
+                   kDefaultTileSamples))
+      ->check(CLI::Range(64, 1 << 20))
+      ->check([](const std::string& text) {
+        const int side = std::atoi(text.c_str());
+        return (side & (side - 1)) == 0 ? "" : text + " is not a power of two";
+      });
+  auto* resume = c->add_flag("--resume", o.resume,
+                             "Go on where a build with the same options was stopped; what it "
+                             "finished is not done again");
+  auto* plan =
+      c->add_option("--plan", o.plan_file,
+                    "Write the steps of the build to this file instead of doing them; with "
+                    "--step, the file to read");
+  plan->excludes(resume);
+  c->add_option("--step", o.step, "Do this step of --plan, a number from 0 on")
+      ->needs(plan)
+      ->excludes(dem)
+      ->excludes(output);
   add_surface(*c, o.dem);
   add_common(*c, o.common);
   c->callback([&] { run = [&o] { return run_build(o); }; });
@@ -164,7 +189,9 @@ void add_viewshed(CLI::App& app, ViewshedOptions& o, std::function<int()>& run) 
   c->add_option("--target-height", o.target_height_m, "Metres above ground of what is looked for")
       ->check(CLI::Range(0.0, 100'000.0));
   constexpr double kLeastDistanceM = 1e-3, kMostDistanceM = 1e8;
-  c->add_option("--max-distance", o.max_distance_m, "Metres along the ground")
+  c->add_option("--max-distance", o.max_distance_m,
+                "Metres along the ground. Of a scene of several tiles, tiles beyond it are neither "
+                "read nor in the answer")
       ->check(CLI::Range(kLeastDistanceM, kMostDistanceM));
   c->add_option("--min-distance", o.min_distance_m, "Metres along the ground")
       ->check(CLI::Range(0.0, kMostDistanceM));
@@ -306,6 +333,9 @@ void add_cull(CLI::App& app, CullOptions& o, std::function<int()>& run) {
   c->add_option("--field-of-view", o.field_of_view_deg, "Degrees; 90 unless given")
       ->needs(azimuth)
       ->check(CLI::Range(0.1, 179.0));
+  c->add_option("--max-distance", o.max_distance_m,
+                "Leave out groups beyond this, metres in plan; tiles beyond it are not read")
+      ->check(CLI::PositiveNumber);
   add_common(*c, o.common);
   c->callback([&] { run = [&o] { return run_cull(o); }; });
 }

@@ -92,7 +92,7 @@ std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& p
       [&] { return std::make_unique<EverythingInView>(scene.groups.leaf_count); });
   for (const char* method : {"thesis", "certified"}) {
     const bool is_certified = std::string(method) == "certified";
-    if (is_certified ? scene.groups.has_certified() : has_horizons(scene))
+    if (is_certified ? scene.groups.has_certified() : has_horizons(scene.scene))
       add(method, is_certified, NAN, region_bytes(scene.groups, method),
           [&] { return culling_method(scene, method); });
   }

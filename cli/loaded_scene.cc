@@ -5,6 +5,8 @@
 #include <algorithm>
 
 #include "core/error/error.h"
+#include "core/occlusion/join_groups.h"
+#include "core/terrain/weld.h"
 #include "core/threads/parallel_for.h"
 #include "tiles/store/groups_file.h"
 #include "tiles/store/tin_file.h"
@@ -38,19 +40,49 @@ FrameDescription frame_of(const SceneDescription& description) {
   return frame;
 }
 
-LoadedScene::LoadedScene(const std::string& path)
-    : scene(open_scene(path)),
-      tin(read_tin(scene.open(scene.require(kOnlyTile, "tin")))),
-      groups(read_groups(scene.open(scene.require(kOnlyTile, "groups")))),
-      frame(frame_of(scene.description())),
-      index(tin) {
-  if (groups.group_of_triangle.size() != tin.triangles.size())
+Groups read_tile_groups(const Scene& scene, const SceneTile& tile, std::size_t triangles) {
+  Groups groups = read_groups(scene.open(scene.require(tile.id, "groups")));
+  if (groups.group_of_triangle.size() != triangles)
     throw Error(
         ErrorCode::kCorrupt,
         fmt::format("'{}': groups of {} triangles for a mesh of {}; files of one scene were "
                     "expected; build it again",
-                    path, groups.group_of_triangle.size(), tin.triangles.size()));
+                    scene.path(), groups.group_of_triangle.size(), triangles));
+  return groups;
 }
+
+namespace {
+
+/// The tiles of the finest level as one surface.
+Tin read_surface(const Scene& scene, Groups& groups) {
+  std::vector<Tin> tins;
+  std::vector<Groups> groups_of_tile;
+  for (const std::size_t i : finest_tiles(scene.description())) {
+    const SceneTile& tile = scene.description().tiles[i];
+    if (scene.find(tile.id, "tin") == nullptr) continue;  // void
+    tins.push_back(read_tin(scene.open(scene.require(tile.id, "tin"))));
+    groups_of_tile.push_back(read_tile_groups(scene, tile, tins.back().triangles.size()));
+  }
+  if (tins.empty())
+    throw Error(ErrorCode::kCorrupt,
+                fmt::format("'{}': has no tile with a mesh; build the scene again", scene.path()));
+  if (tins.size() == 1) {
+    groups = std::move(groups_of_tile.front());
+    return std::move(tins.front());
+  }
+  groups = join_groups(groups_of_tile);
+  std::vector<const Tin*> parts;
+  for (const Tin& tin : tins) parts.push_back(&tin);
+  return weld(parts).tin;
+}
+
+}  // namespace
+
+LoadedScene::LoadedScene(const std::string& path)
+    : scene(open_scene(path)),
+      tin(read_surface(scene, groups)),
+      frame(frame_of(scene.description())),
+      index(tin) {}
 
 std::optional<double> ground_height_m(const GeoFrame::Placer& placer, const TinIndex& index,
                                       double x, double y) {

@@ -13,19 +13,20 @@
 
 namespace scarp {
 
-/// The one tile that a scene has today.
-inline constexpr char kOnlyTile[] = "0/0/0";
-
-/// A scene in memory, with all that commands ask of it.
+/// A scene in memory, with all that commands ask of it: the tiles of its finest level as one
+/// surface, which takes what the whole mesh takes.
 struct LoadedScene {
   explicit LoadedScene(const std::string& path);
 
   Scene scene;
-  Tin tin;
   Groups groups;
+  Tin tin;
   GeoFrame frame;
   TinIndex index;
 };
+
+/// The groups of a tile. Throws Error{kCorrupt} where they are not of as many triangles.
+Groups read_tile_groups(const Scene& scene, const SceneTile& tile, std::size_t triangles);
 
 /// The scene among the sources of a command, or nothing where all are DEMs.
 /// Throws Error{kUsage} where a scene is not alone, or options for reading a DEM are given with it.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -50,6 +51,8 @@ struct Budget {
   std::optional<double> bytes_per_triangle;  ///< of what is stored
 };
 
+inline constexpr std::int32_t kDefaultTileSamples = 1024;
+
 struct BuildOptions {
   CommonOptions common;
   DemOptions dem;
@@ -75,6 +78,11 @@ struct BuildOptions {
   std::uint64_t seed = 1;
   std::optional<TypedPosition> observer;
   std::string crs;  ///< of the observer; empty: the data's
+  /// Cells along a side of a tile of the finest level, a power of two.
+  std::int32_t tile_samples = kDefaultTileSamples;
+  bool resume = false;              ///< go on where a build was stopped
+  std::string plan_file;            ///< empty: none
+  std::optional<std::size_t> step;  ///< of the plan: do this one only
 };
 
 enum class ViewshedMode { kVisible, kCount, kGround, kDem };
@@ -141,6 +149,7 @@ struct CullOptions {
   std::string crs;
   std::optional<double> azimuth_deg;  ///< of the view's middle; none: all around
   double field_of_view_deg = 90;
+  std::optional<double> max_distance_m;
 };
 
 struct VerifyOptions {

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "cli/build/certified_settings.h"
 #include "core/culling/certified_culling.h"
 #include "core/culling/visible_groups.h"
@@ -10,25 +12,33 @@
 namespace scarp {
 namespace {
 
-[[noreturn]] void refuse(const LoadedScene& scene, const char* method, const char* other) {
+[[noreturn]] void refuse(const Scene& scene, const char* method, const char* other) {
   throw Error(ErrorCode::kInput,
               fmt::format("'{}': the scene was built without what --method {} needs; build it "
                           "with --horizon both, or give --method {}",
-                          scene.scene.path(), method, other));
+                          scene.path(), method, other));
 }
 
 }  // namespace
 
-bool has_horizons(const LoadedScene& scene) {
-  return scene.scene.find(kOnlyTile, "horizon") != nullptr;
+bool has_horizons(const Scene& scene) {
+  const auto& tiles = scene.description().tiles;
+  return std::any_of(tiles.begin(), tiles.end(), [&](const SceneTile& tile) {
+    return scene.find(tile.id, "horizon") != nullptr;
+  });
+}
+
+std::unique_ptr<CullingMethod> culling_method(const Scene& scene, const Groups& groups,
+                                              const std::string& name) {
+  if (name == "certified" && !groups.has_certified()) refuse(scene, "certified", "thesis");
+  if (name == "thesis" && !has_horizons(scene)) refuse(scene, "thesis", "certified");
+  if (name != "thesis" && groups.has_certified())
+    return std::make_unique<CertifiedCulling>(groups.certified);
+  return std::make_unique<ThesisCulling>(groups);
 }
 
 std::unique_ptr<CullingMethod> culling_method(const LoadedScene& scene, const std::string& name) {
-  if (name == "certified" && !scene.groups.has_certified()) refuse(scene, "certified", "thesis");
-  if (name == "thesis" && !has_horizons(scene)) refuse(scene, "thesis", "certified");
-  if (name != "thesis" && scene.groups.has_certified())
-    return std::make_unique<CertifiedCulling>(scene.groups.certified);
-  return std::make_unique<ThesisCulling>(scene.groups);
+  return culling_method(scene.scene, scene.groups, name);
 }
 
 std::vector<std::unique_ptr<CullingMethod>> culling_methods(const Groups& groups,

@@ -15,9 +15,13 @@ namespace scarp {
 /// Throws Error{kInput} where the scene was built without what the method needs.
 std::unique_ptr<CullingMethod> culling_method(const LoadedScene& scene, const std::string& name);
 
+/// The same for the groups of one tile of a scene, which must outlive it.
+std::unique_ptr<CullingMethod> culling_method(const Scene& scene, const Groups& groups,
+                                              const std::string& name);
+
 /// Whether a scene has horizons of the vertices. Without them the regions of method thesis are
 /// empty, and hide nothing.
-bool has_horizons(const LoadedScene& scene);
+bool has_horizons(const Scene& scene);
 
 /// All methods that groups can be culled by, thesis first. The groups must outlive them.
 std::vector<std::unique_ptr<CullingMethod>> culling_methods(const Groups& groups,

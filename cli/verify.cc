@@ -162,7 +162,7 @@ int run_verify(const VerifyOptions& options) {
       throw Error(ErrorCode::kUsage,
                   fmt::format("--heights {}: metres above ground were expected", height_m));
   const LoadedScene scene(options.scene);
-  const auto methods = culling_methods(scene.groups, has_horizons(scene));
+  const auto methods = culling_methods(scene.groups, has_horizons(scene.scene));
   ProgressBar bar(!options.common.json);
   const VerifyPlan plan{options.eyes, options.heights_m, options.seed, 1};
   const std::vector<VerifyCounts> all =

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/error/error.h"
@@ -40,18 +41,36 @@ bool same_cells(const Dem& a, const Dem& b) {
          near(5, height / a.rows);
 }
 
+/// The tiles that eyes reach; all where that is not known, or where they reach none.
+std::vector<std::size_t> tiles_for(const SceneTiles& scene, const std::optional<ViewReach>& reach) {
+  // Metres along the ground are those of the plane but for its flattening.
+  constexpr double kMoreInPlane = 1.02;
+  std::vector<std::size_t> tiles;
+  for (std::size_t i = 0; i < scene.size(); ++i) {
+    const auto reaches = [&](const TypedPosition& eye) {
+      MapPoint point = to_map_point(eye, reach->crs, scene.frame());
+      point.height_m = 0;
+      return scene.meets(
+          i, {GeoFrame::Placer(scene.frame()).place(point), kMoreInPlane * reach->distance_m, {}});
+    };
+    if (!reach || std::any_of(reach->eyes.begin(), reach->eyes.end(), reaches)) tiles.push_back(i);
+  }
+  if (!tiles.empty()) return tiles;
+  return tiles_for(scene, {});
+}
+
 }  // namespace
 
 ViewSource::ViewSource(const std::vector<std::string>& sources,
                        const std::vector<std::string>& obstacles, const DemOptions& options,
-                       const Progress& progress) {
+                       const Progress& progress, const std::optional<ViewReach>& reach) {
   if (const std::string* scene = scene_among(sources, options)) {
     if (!obstacles.empty())
       throw Error(ErrorCode::kUsage,
                   fmt::format("'{}': is a scene, whose surface blocks; leave --obstacles out, or "
                               "name the terrain model instead",
                               *scene));
-    scene_.emplace(*scene);
+    scene_ = std::make_unique<const SceneGround>(*scene, reach);
     stand_on_scene();
     return;
   }
@@ -60,12 +79,18 @@ ViewSource::ViewSource(const std::vector<std::string>& sources,
   tops_.emplace(obstacles_ ? *obstacles_ : ground_.grid, ground_.grid);
 }
 
+ViewSource::SceneGround::SceneGround(const std::string& path, const std::optional<ViewReach>& reach)
+    : tiles(path), used(tiles_for(tiles, reach)), tin(tiles.read_ground(used)), index(tin) {}
+
 void ViewSource::stand_on_scene() {
-  const SceneDescription& description = scene_->scene.description();
+  const SceneDescription& description = scene_->tiles.scene().description();
+  const TileWindow window = scene_->tiles.window_of(scene_->used);
   Dem& dem = ground_.dem;
-  dem.columns = description.raster.columns;
-  dem.rows = description.raster.rows;
+  dem.columns = window.columns;
+  dem.rows = window.rows;
   dem.geotransform = description.raster.geotransform;
+  dem.geotransform[0] += window.first_column * dem.geotransform[1];
+  dem.geotransform[3] += window.first_row * dem.geotransform[5];
   dem.frame = std::make_shared<const GeoFrame>(frame_of(description));
   dem.height_unit = std::string("m");
   ground_.grid = GroundGrid(dem.columns, dem.rows, ground_placement(dem));

@@ -1,24 +1,35 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "cli/ground_eye.h"
-#include "cli/loaded_scene.h"
 #include "cli/options.h"
+#include "cli/scene_tiles.h"
 #include "core/viewshed/viewshed.h"
 #include "ingest/dem/dem.h"
 
 namespace scarp {
+
+/// Eyes that are known before their ground is, and how far they see along the ground.
+struct ViewReach {
+  std::vector<TypedPosition> eyes;
+  std::string crs;  ///< of the eyes; empty: the data's
+  double distance_m = HUGE_VAL;
+};
 
 /// What viewsheds are taken over: DEMs, with obstacles above them or without, or a scene.
 class ViewSource {
  public:
   /// Throws Error: what a scene or a DEM throws; kUsage where options for reading a DEM are given
   /// with a scene, or a scene is not alone; kInput where obstacles do not share the DEM's cells.
+  /// @param reach  of a scene of several tiles only those that the eyes reach are read, and the
+  ///               raster is the rectangle of these; none: all
   ViewSource(const std::vector<std::string>& sources, const std::vector<std::string>& obstacles,
-             const DemOptions& options, const Progress& progress);
+             const DemOptions& options, const Progress& progress,
+             const std::optional<ViewReach>& reach = {});
 
   /// "grid" or "tin".
   const char* surface() const { return scene_ ? "tin" : "grid"; }
@@ -30,16 +41,30 @@ class ViewSource {
   const GroundGrid& samples() const { return ground_.grid; }
   ViewGround ground() const;
 
+  /// Tiles of a scene, and how many of them were read; 0 of a DEM.
+  std::size_t tiles() const { return scene_ ? scene_->tiles.size() : 0; }
+  std::size_t tiles_read() const { return scene_ ? scene_->tiles.tiles_read() : 0; }
+
   /// Throws as place_eye does.
   GroundEye place(const TypedPosition& typed, const std::string& crs) const;
   /// A point in the CRS of the data. @param text  the position as given, for messages
   GroundEye place(const MapPoint& point, bool above_datum, const std::string& text) const;
 
  private:
+  /// Tiles of a scene as one surface.
+  struct SceneGround {
+    SceneGround(const std::string& path, const std::optional<ViewReach>& reach);
+
+    SceneTiles tiles;
+    std::vector<std::size_t> used;
+    Tin tin;
+    TinIndex index;
+  };
+
   void stand_on_scene();
   void read_obstacles(const std::vector<std::string>& files, const DemOptions& options);
 
-  std::optional<LoadedScene> scene_;
+  std::unique_ptr<const SceneGround> scene_;
   Ground ground_;
   std::optional<GroundGrid> obstacles_;
   std::optional<GroundTops> tops_;  // of a DEM

@@ -212,7 +212,10 @@ class ViewshedRun {
     dem.make_room = [&](double samples, double reading_bytes) {
       return make_room(samples, reading_bytes);
     };
-    source_.emplace(options_.sources, options_.obstacles, dem, progress);
+    std::optional<ViewReach> reach;
+    if (options_.max_distance_m && options_.observers_file.empty() && !options_.total)
+      reach = ViewReach{options_.observers, options_.crs, *options_.max_distance_m};
+    source_.emplace(options_.sources, options_.obstacles, dem, progress, reach);
     for (const TypedPosition& typed : options_.observers)
       eyes_.push_back({source_->place(typed, options_.crs), options_.target_height_m,
                        limits_of(options_.min_distance_m, options_.max_distance_m,
@@ -517,10 +520,10 @@ class ViewshedRun {
   }
 
   nlohmann::json summary() const {
-    nlohmann::json result = {{"output", options_.output},
-                             {"columns", source_->samples().columns()},
-                             {"rows", source_->samples().rows()},
-                             {"observers", eyes_.size()}};
+    nlohmann::json result = {
+        {"output", options_.output},           {"tiles", source_->tiles()},
+        {"tiles_read", source_->tiles_read()}, {"columns", source_->samples().columns()},
+        {"rows", source_->samples().rows()},   {"observers", eyes_.size()}};
     if (!options_.polygons.empty()) result["polygons"] = options_.polygons;
     if (options_.total) {
       result["looks"] = looks_;

@@ -17,6 +17,9 @@ struct SampleGrid {
   std::int32_t rows = 0;
   std::vector<Position> positions;  ///< [rows * columns], row by row
   std::vector<std::uint8_t> known;  ///< [rows * columns], 0 where the sample is void
+  /// Empty, or [rows * columns], 1 where the cell with that upper left sample is void even if its
+  /// corners are known: on coarser levels, where it holds void between them.
+  std::vector<std::uint8_t> void_cells;
   /// Cell size at the scene's centre, metres, both positive. Nominal: positions decide.
   double cell_x_m = 0;
   double cell_y_m = 0;
@@ -35,11 +38,13 @@ struct SampleGrid {
   bool is_known(std::int32_t column, std::int32_t row) const {
     return known[index(column, row)] != 0;
   }
-  /// A cell is ground where its four corner samples are known; (column, row) is its upper left.
+  /// A cell is ground where its four corner samples are known and nothing says that there is void
+  /// between them; (column, row) is its upper left.
   bool is_ground_cell(std::int32_t column, std::int32_t row) const {
     return column >= 0 && row >= 0 && column + 1 < columns && row + 1 < rows &&
            is_known(column, row) && is_known(column + 1, row) && is_known(column, row + 1) &&
-           is_known(column + 1, row + 1);
+           is_known(column + 1, row + 1) &&
+           (void_cells.empty() || void_cells[index(column, row)] == 0);
   }
 };
 

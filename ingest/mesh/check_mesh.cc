@@ -17,12 +17,13 @@ struct PlanePoint {
 
 class MeshCheck {
  public:
-  MeshCheck(const SampleGrid& grid, const Mesh& mesh)
-      : grid_(grid), mesh_(mesh), plane_(sample_plane_of(grid)) {}
+  MeshCheck(const SampleGrid& grid, const Mesh& mesh, std::optional<std::int32_t> tile_cells)
+      : grid_(grid), mesh_(mesh), tile_cells_(tile_cells), plane_(sample_plane_of(grid)) {}
 
   std::optional<std::string> run() const {
     if (auto broken = check_tin(mesh_.tin)) return broken;
     if (auto broken = check_vertices()) return broken;
+    if (auto broken = check_tiles()) return broken;
     if (auto broken = check_delaunay()) return broken;
     if (auto broken = check_border()) return broken;
     return check_area();
@@ -63,11 +64,30 @@ class MeshCheck {
     return lift(a) * minor(b, c) + lift(b) * minor(c, a) + lift(c) * minor(a, b) > 0;
   }
 
+  /// Tiles that the triangles lie in; 0, 0 without tiles.
+  GridNode tile_of(TriangleIndex t) const {
+    if (!tile_cells_) return {};
+    GridNode low = node(mesh_.tin.triangles[t][0]);
+    for (const VertexIndex v : mesh_.tin.triangles[t])
+      low = {std::min(low.column, node(v).column), std::min(low.row, node(v).row)};
+    return {low.column / *tile_cells_, low.row / *tile_cells_};
+  }
+
+  std::optional<std::string> check_tiles() const {
+    if (!tile_cells_) return {};
+    for (TriangleIndex t = 0; t < mesh_.tin.triangles.size(); ++t)
+      for (const VertexIndex v : mesh_.tin.triangles[t])
+        if (node(v).column > (tile_of(t).column + 1) * *tile_cells_ ||
+            node(v).row > (tile_of(t).row + 1) * *tile_cells_)
+          return "triangle " + std::to_string(t) + " crosses the edge of a tile";
+    return {};
+  }
+
   std::optional<std::string> check_delaunay() const {
-    for (std::size_t t = 0; t < mesh_.tin.triangles.size(); ++t) {
+    for (TriangleIndex t = 0; t < mesh_.tin.triangles.size(); ++t) {
       const auto& [a, b, c] = mesh_.tin.triangles[t];
       for (const TriangleIndex across : mesh_.tin.neighbours[t]) {
-        if (across == kNone) continue;
+        if (across == kNone || !(tile_of(across) == tile_of(t))) continue;
         for (const VertexIndex v : mesh_.tin.triangles[across])
           if (in_circle(point(a), point(b), point(c), point(v)))
             return "triangle " + std::to_string(t) + " has vertex " + std::to_string(v) +
@@ -128,13 +148,15 @@ class MeshCheck {
 
   const SampleGrid& grid_;
   const Mesh& mesh_;
+  const std::optional<std::int32_t> tile_cells_;
   SamplePlane plane_;
 };
 
 }  // namespace
 
-std::optional<std::string> check_mesh(const SampleGrid& grid, const Mesh& mesh) {
-  return MeshCheck(grid, mesh).run();
+std::optional<std::string> check_mesh(const SampleGrid& grid, const Mesh& mesh,
+                                      std::optional<std::int32_t> tile_cells) {
+  return MeshCheck(grid, mesh, tile_cells).run();
 }
 
 }  // namespace scarp

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "ingest/mesh/mesh.h"
+#include "ingest/mesh/shared_edge.h"
 
 namespace scarp {
 namespace {
@@ -45,71 +46,120 @@ void append_split(const SampleGrid& grid, const BorderRun& run, std::vector<Bord
   }
 }
 
-/// One grid line's runs. border(i) says whether the unit edge i of the line is border, and on which
-/// side ground lies (0 none, 1, 2); node(i) is its i-th sample. Where the border turns the line's
-/// edges end, and where it touches itself they change sides.
-template <class Border, class Node>
-void append_line(const SampleGrid& grid, std::int32_t units, const Border& border, const Node& node,
-                 std::vector<BorderRun>& runs) {
-  for (std::int32_t i = 0; i < units;) {
-    const int side = border(i);
+/// Added to the side of an edge of a tile that has ground beyond.
+constexpr int kShared = 2;
+
+/// One grid line's runs. side(i) says whether the unit edge i of the line is border, and on which
+/// side ground lies (0 none, 1, 2; kShared more with ground on both); node(i) is its i-th sample.
+/// Where the border turns the line's edges end, and where it touches itself they change sides.
+template <class Side, class Node, class Append>
+void append_line(std::int32_t first, std::int32_t last, const Side& side, const Node& node,
+                 const Append& append) {
+  for (std::int32_t i = first; i < last;) {
+    const int here = side(i);
     std::int32_t end = i + 1;
-    if (side != 0) {
-      while (end < units && border(end) == side) ++end;
-      append_split(grid, {node(i), node(end)}, runs);
+    if (here != 0) {
+      while (end < last && side(end) == here) ++end;
+      append(here, BorderRun{node(i), node(end)});
     }
     i = end;
   }
 }
 
-}  // namespace
-
-GroundCells::GroundCells(const SampleGrid& grid)
-    : columns_(grid.columns), rows_(grid.rows), ground_(grid.positions.size(), 0) {
-  for (std::int32_t row = 0; row + 1 < rows_; ++row) {
-    const std::uint8_t* upper = grid.known.data() + grid.index(0, row);
-    const std::uint8_t* lower = upper + columns_;
-    std::uint8_t* out = ground_.data() + grid.index(0, row);
-    for (std::int32_t c = 0; c + 1 < columns_; ++c) {
-      out[c] = upper[c] && upper[c + 1] && lower[c] && lower[c + 1];
-      count_ += out[c];
+/// Appends an edge between two tiles.
+void append_shared(const SharedEdge& edge, const SampleRange& range, const BorderRun& run,
+                   TileBorder& border) {
+  const auto is_corner = [&](const GridNode& n) {
+    return (n.column == range.first.column || n.column == range.last.column) &&
+           (n.row == range.first.row || n.row == range.last.row);
+  };
+  std::vector<GridNode> vertices;
+  edge.cut(run.from, run.to, is_corner(run.from), is_corner(run.to), vertices);
+  const GridNode step{run.to.column > run.from.column, run.to.row > run.from.row};
+  for (std::size_t i = 0; i + 1 < vertices.size(); ++i) {
+    border.runs.push_back({vertices[i], vertices[i + 1]});
+    for (GridNode n = vertices[i];;) {
+      n = {n.column + step.column, n.row + step.row};
+      if (n == vertices[i + 1]) break;
+      border.locked.push_back(n);
     }
   }
 }
 
+}  // namespace
+
+GroundCells::GroundCells(const SampleGrid& grid, const SampleRange& range)
+    : columns_(grid.columns), rows_(grid.rows), ground_(grid.positions.size(), 0) {
+  for (std::int32_t row = range.first.row; row < range.last.row; ++row) {
+    const std::uint8_t* upper = grid.known.data() + grid.index(0, row);
+    const std::uint8_t* lower = upper + columns_;
+    std::uint8_t* out = ground_.data() + grid.index(0, row);
+    for (std::int32_t c = range.first.column; c < range.last.column; ++c)
+      out[c] = upper[c] && upper[c + 1] && lower[c] && lower[c + 1];
+    if (!grid.void_cells.empty())
+      for (std::int32_t c = range.first.column; c < range.last.column; ++c)
+        out[c] = out[c] && !grid.void_cells[grid.index(c, row)];
+    for (std::int32_t c = range.first.column; c < range.last.column; ++c) count_ += out[c];
+  }
+}
+
 std::vector<BorderRun> ground_border(const SampleGrid& grid, const GroundCells& ground) {
-  const auto side = [](bool one, bool other) { return one == other ? 0 : (one ? 1 : 2); };
-  const auto across_row = [&](std::int32_t c, std::int32_t r) {  // edge (c, r) - (c+1, r)
-    return side(ground(c, r - 1), ground(c, r));
+  return tile_border(grid, ground, all_samples(grid), 0, MeshBound::kSurface).runs;
+}
+
+TileBorder tile_border(const SampleGrid& grid, const GroundCells& ground, const SampleRange& range,
+                       double max_error_m, MeshBound bound) {
+  TileBorder border;
+  const SharedEdge shared(grid, max_error_m, bound);
+  const auto append = [&](int side, const BorderRun& run) {
+    if (side <= kShared)
+      append_split(grid, run, border.runs);
+    else
+      append_shared(shared, range, run, border);
   };
-  const auto across_column = [&](std::int32_t c, std::int32_t r) {  // edge (c, r) - (c, r+1)
-    return side(ground(c - 1, r), ground(c, r));
+  /// Cells on both sides of a unit edge: which of them is the tile's ground, and whether ground
+  /// lies across the edge of the tile.
+  const auto side_of = [&](const GridNode& one, const GridNode& other) {
+    const bool at_one = ground(one.column, one.row), at_other = ground(other.column, other.row);
+    if (at_one == at_other) return 0;
+    const GridNode& beyond = at_one ? other : one;
+    const bool is_shared = grid.is_ground_cell(beyond.column, beyond.row);
+    return (at_one ? 1 : 2) + (is_shared ? kShared : 0);
   };
-  std::vector<BorderRun> runs;
-  for (std::int32_t r = 0; r < grid.rows; ++r) {
+  for (std::int32_t r = range.first.row; r <= range.last.row; ++r) {
     append_line(
-        grid, grid.columns - 1, [&](std::int32_t c) { return across_row(c, r); },
+        range.first.column, range.last.column,
+        [&](std::int32_t c) {
+          return side_of({c, r - 1}, {c, r});
+        },
         [&](std::int32_t c) {
           return GridNode{c, r};
         },
-        runs);
+        append);
   }
-  for (std::int32_t c = 0; c < grid.columns; ++c) {
+  for (std::int32_t c = range.first.column; c <= range.last.column; ++c) {
     append_line(
-        grid, grid.rows - 1, [&](std::int32_t r) { return across_column(c, r); },
+        range.first.row, range.last.row,
+        [&](std::int32_t r) {
+          return side_of({c - 1, r}, {c, r});
+        },
         [&](std::int32_t r) {
           return GridNode{c, r};
         },
-        runs);
+        append);
   }
-  return runs;
+  return border;
 }
 
-std::uint32_t count_lost_samples(const SampleGrid& grid, const GroundCells& ground) {
+std::uint32_t count_lost_samples(const SampleGrid& grid, const SampleRange& range) {
+  const std::int32_t columns_end =
+      range.last.column + 1 == grid.columns ? grid.columns : range.last.column;
+  const std::int32_t rows_end = range.last.row + 1 == grid.rows ? grid.rows : range.last.row;
   std::uint32_t lost = 0;
-  for (std::int32_t r = 0; r < grid.rows; ++r)
-    for (std::int32_t c = 0; c < grid.columns; ++c)
-      lost += grid.is_known(c, r) && !ground.touches({c, r});
+  for (std::int32_t r = range.first.row; r < rows_end; ++r)
+    for (std::int32_t c = range.first.column; c < columns_end; ++c)
+      lost += grid.is_known(c, r) && !grid.is_ground_cell(c, r) && !grid.is_ground_cell(c - 1, r) &&
+              !grid.is_ground_cell(c, r - 1) && !grid.is_ground_cell(c - 1, r - 1);
   return lost;
 }
 

@@ -14,13 +14,16 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <unordered_set>
 #include <utility>
 
 #include "core/error/error.h"
 #include "core/geodesy/predicates.h"
 #include "ingest/mesh/cell_walk.h"
 #include "ingest/mesh/ground.h"
+#include "ingest/mesh/height_plane.h"
 #include "ingest/mesh/plane_traits.h"
+#include "ingest/mesh/tile_mesh.h"
 
 namespace scarp {
 namespace {
@@ -67,37 +70,6 @@ struct HeapEntry {
   }
 };
 
-/// A plane over the flattened x, y through three positions.
-struct HeightPlane {
-  double x_m, y_m, z_m, slope_x, slope_y;
-
-  HeightPlane(const Position& a, const Position& b, const Position& c)
-      : x_m(a.x_m), y_m(a.y_m), z_m(a.z_m) {
-    const double bx = b.x_m - a.x_m, by = b.y_m - a.y_m, bz = b.z_m - a.z_m;
-    const double cx = c.x_m - a.x_m, cy = c.y_m - a.y_m, cz = c.z_m - a.z_m;
-    const double inverse = 1 / (bx * cy - by * cx);
-    slope_x = (bz * cy - by * cz) * inverse;
-    slope_y = (bx * cz - bz * cx) * inverse;
-  }
-  double error_m(const Position& p) const {
-    return std::abs((p.z_m - z_m) - slope_x * (p.x_m - x_m) - slope_y * (p.y_m - y_m));
-  }
-};
-
-/// Vertical distance of the segments a - b and p - q where they cross in the plane.
-double crossing_error_m(const Position& a, const Position& b, const Position& p,
-                        const Position& q) {
-  const double dx = b.x_m - a.x_m, dy = b.y_m - a.y_m;
-  const double side_p = dx * (p.y_m - a.y_m) - dy * (p.x_m - a.x_m);
-  const double side_q = dx * (q.y_m - a.y_m) - dy * (q.x_m - a.x_m);
-  const double along_pq = side_p / (side_p - side_q);
-  const bool by_x = std::abs(dx) >= std::abs(dy);
-  const double reached = by_x ? p.x_m + along_pq * (q.x_m - p.x_m) - a.x_m
-                              : p.y_m + along_pq * (q.y_m - p.y_m) - a.y_m;
-  const double along_ab = reached / (by_x ? dx : dy);
-  return std::abs((p.z_m - a.z_m) + along_pq * (q.z_m - p.z_m) - along_ab * (b.z_m - a.z_m));
-}
-
 /// Whether all samples lie exactly on straight, evenly spaced grid lines. Then the sample plane and
 /// the flattened plane are affine images of each other and nothing needs to be tested for bending.
 bool is_exactly_affine(const SampleGrid& grid, const GroundCells& ground) {
@@ -129,7 +101,8 @@ bool is_exactly_affine(const SampleGrid& grid, const GroundCells& ground) {
 
 class GreedyMesher {
  public:
-  GreedyMesher(const SampleGrid& grid, const MeshOptions& options, const Progress& progress);
+  GreedyMesher(const SampleGrid& grid, const SampleRange& range, const MeshOptions& options,
+               const Progress& progress);
   Mesh run();
 
  private:
@@ -159,6 +132,15 @@ class GreedyMesher {
     const std::uint32_t lower = upper + static_cast<std::uint32_t>(grid_.columns);
     return is_vertex(upper) && is_vertex(upper + 1) && is_vertex(lower) && is_vertex(lower + 1);
   }
+  /// Whether a sample is kept out for the tile beyond the edge that it lies on.
+  bool is_locked(std::uint32_t sample) const { return !locked_.empty() && locked_[sample]; }
+  bool is_insertable(const GridNode& n) const {
+    return !is_vertex(index(n)) && !is_locked(index(n));
+  }
+  /// Whether nothing is left to be inserted that would help a cell.
+  bool is_settled(const GridNode& cell) const {
+    return is_resolved(cell) || (!settled_.empty() && settled_.contains(index(cell)));
+  }
   bool is_ground(Face f) const;
   double bend_cells_over(double length_cells) const {
     return affine_ ? 0 : grid_.bend_cells * length_cells * length_cells + rounding_cells_;
@@ -183,6 +165,8 @@ class GreedyMesher {
   bool belongs(Face f, const GridNode& n) const;
   std::optional<GridNode> shape_repair(Face f) const;
   std::pair<GridNode, Face> worst_corner(const GridNode& cell, Face near) const;
+  std::optional<GridNode> beside_locked(const GridNode& cell) const;
+  GridNode cell_beside(const GridNode& locked) const;
 
   // The result.
   void measure_all_edges();
@@ -195,6 +179,7 @@ class GreedyMesher {
   double cell_ambiguity_m() const;
 
   const SampleGrid& grid_;
+  const SampleRange range_;
   const MeshOptions& options_;
   const Progress& progress_;
   GroundCells ground_;
@@ -203,6 +188,8 @@ class GreedyMesher {
   double rounding_cells_;  // how far rounding to the lattice moves samples against each other
   Triangulation cdt_;
   std::vector<VertexIndex> vertex_of_sample_;  // kNone where the sample is no vertex
+  std::vector<std::uint8_t> locked_;           // [samples], empty where there are none
+  std::unordered_set<std::uint32_t> settled_;  // cells beside locked samples
   std::vector<HeapEntry> heap_;
   std::vector<Face> open_;  // faces around a new vertex, still to be tested
   double goal_m_ = 0;
@@ -211,12 +198,13 @@ class GreedyMesher {
   double told_ = 0;  // progress must not fall
 };
 
-GreedyMesher::GreedyMesher(const SampleGrid& grid, const MeshOptions& options,
-                           const Progress& progress)
+GreedyMesher::GreedyMesher(const SampleGrid& grid, const SampleRange& range,
+                           const MeshOptions& options, const Progress& progress)
     : grid_(grid),
+      range_(range),
       options_(options),
       progress_(progress),
-      ground_(grid),
+      ground_(grid, range),
       plane_(sample_plane_of(grid)),
       affine_(is_exactly_affine(grid, ground_)),
       // A sample moves by at most half a step in x and in y, and so does the chord's end.
@@ -234,7 +222,9 @@ bool GreedyMesher::is_ground(Face f) const {
 /// Puts the border of the ground in as constraints. This is the place for further constraints,
 /// such as building outlines: they would be inserted here, with heights of their own.
 void GreedyMesher::insert_border() {
-  const std::vector<BorderRun> runs = ground_border(grid_, ground_);
+  const TileBorder border =
+      tile_border(grid_, ground_, range_, options_.max_error_m.value_or(0), options_.bound);
+  const std::vector<BorderRun>& runs = border.runs;
   std::vector<Point> ends;
   for (const BorderRun& run : runs) {
     for (const GridNode& n : {run.from, run.to}) {
@@ -252,6 +242,8 @@ void GreedyMesher::insert_border() {
     vertex_of_sample_[index(vertices[i]->info())] = static_cast<VertexIndex>(i);
     near = vertices[i]->face();
   }
+  if (!border.locked.empty()) locked_.assign(vertex_of_sample_.size(), 0);
+  for (const GridNode& n : border.locked) locked_[index(n)] = 1;
   for (const BorderRun& run : runs)
     cdt_.insert_constraint(vertices[vertex_of_sample_[index(run.from)]],
                            vertices[vertex_of_sample_[index(run.to)]]);
@@ -360,8 +352,12 @@ void GreedyMesher::obey(const HeapEntry& entry) {
   GridNode n = node_at(entry.target & kTargetMask);
   Face near = entry.face;
   if ((entry.target & ~kTargetMask) == kResolveCell) {
-    std::tie(n, near) = worst_corner(n, near);
-    if (near == Face()) return scan(entry.face);  // resolved in the meantime
+    const GridNode cell = n;
+    std::tie(n, near) = worst_corner(cell, near);
+    if (near == Face()) {  // resolved in the meantime, or as far as it can be
+      if (!is_resolved(cell)) settled_.insert(index(cell));
+      return scan(entry.face);
+    }
   }
   if (is_vertex(index(n))) return scan(near);
   insert_sample(n, near);
@@ -377,7 +373,7 @@ std::pair<GridNode, Face> GreedyMesher::worst_corner(const GridNode& cell, Face 
   for (const int dr : {0, 1}) {
     for (const int dc : {0, 1}) {
       const GridNode n{cell.column + dc, cell.row + dr};
-      if (is_vertex(index(n))) continue;
+      if (!is_insertable(n)) continue;
       const Face f = cdt_.locate(point(n), near);
       double error_m = 0;
       if (!cdt_.is_infinite(f))
@@ -390,7 +386,40 @@ std::pair<GridNode, Face> GreedyMesher::worst_corner(const GridNode& cell, Face 
       }
     }
   }
+  if (worst.second == Face())
+    if (const auto n = beside_locked(cell)) worst = {*n, cdt_.locate(point(*n), near)};
   return worst;
+}
+
+/// Where a cell has a locked corner, the error can come from samples further along the edge that
+/// are no vertices yet: of those beside the same piece of the edge, the nearest to the cell.
+std::optional<GridNode> GreedyMesher::beside_locked(const GridNode& cell) const {
+  for (const int dr : {0, 1}) {
+    for (const int dc : {0, 1}) {
+      const GridNode n{cell.column + dc, cell.row + dr};
+      if (!is_locked(index(n))) continue;
+      const bool by_column = n.column == range_.first.column || n.column == range_.last.column;
+      const GridNode inwards{by_column ? 1 - 2 * dc : 0, by_column ? 0 : 1 - 2 * dr};
+      std::array<bool, 2> goes_on = {true, true};
+      for (std::int32_t away = 0; goes_on[0] || goes_on[1]; ++away) {
+        for (const int way : {0, 1}) {
+          if (!goes_on[static_cast<std::size_t>(way)]) continue;
+          const std::int32_t along = way == 0 ? away : -away;
+          const GridNode on{n.column + (by_column ? 0 : along), n.row + (by_column ? along : 0)};
+          goes_on[static_cast<std::size_t>(way)] = is_locked(index(on));
+          const GridNode inner{on.column + inwards.column, on.row + inwards.row};
+          if (is_insertable(inner)) return inner;
+        }
+      }
+    }
+  }
+  return {};
+}
+
+/// The cell of the tile's ground whose corners are looked at when a locked sample errs.
+GridNode GreedyMesher::cell_beside(const GridNode& locked) const {
+  return {std::min(locked.column, range_.last.column - 1),
+          std::min(locked.row, range_.last.row - 1)};
 }
 
 /// Finds the worst place of a face and puts it on the heap where it is above the goal.
@@ -448,10 +477,11 @@ Candidate GreedyMesher::worst_sample(const std::array<GridNode, 3>& n, Face f) c
   // distance from a whole number lets samples on the edge in and no other.
   constexpr double kOnEdge = 0x1p-21;
   Candidate worst;
-  const std::int32_t first = std::max(top - beyond, 0);
-  const std::int32_t last = std::min(bottom + beyond, grid_.rows - 1);
+  const std::int32_t first = std::max(top - beyond, range_.first.row);
+  const std::int32_t last = std::min(bottom + beyond, range_.last.row);
   for (std::int32_t r = first; r <= last; ++r) {
-    double low = 0, high = grid_.columns - 1, inner_low = low, inner_high = high;
+    double low = range_.first.column, high = range_.last.column;
+    double inner_low = low, inner_high = high;
     for (const EdgeColumns& e : edges) {
       const double at = e.at_row0 + (r - top) * e.per_row;
       if (e.bounds > 0) {
@@ -469,7 +499,12 @@ Candidate GreedyMesher::worst_sample(const std::array<GridNode, 3>& n, Face f) c
     const auto look = [&](std::int32_t c) {
       const double error_m = plane.error_m(positions[c]);
       const std::uint32_t sample = row + static_cast<std::uint32_t>(c);
-      if (error_m > worst.error_m && !is_vertex(sample)) worst = {error_m, sample};
+      if (!(error_m > worst.error_m) || is_vertex(sample)) return;
+      if (!is_locked(sample)) {
+        worst = {error_m, sample};
+      } else if (const GridNode cell = cell_beside({c, r}); !is_settled(cell)) {
+        worst = {error_m, index(cell) | kResolveCell};
+      }
     };
     if (straight) {
       for (std::int32_t c = from; c <= to; ++c) look(c);
@@ -534,7 +569,7 @@ std::optional<GridNode> GreedyMesher::shape_repair(Face f) const {
   for (std::int32_t r = r0; r <= std::min(r0 + 1, grid_.rows - 1); ++r) {
     for (std::int32_t c = c0; c <= std::min(c0 + 1, grid_.columns - 1); ++c) {
       const double away = std::hypot(c - middle_column, r - middle_row);
-      if (away >= nearest_cells || is_vertex(index({c, r})) || !ground_.touches({c, r})) continue;
+      if (away >= nearest_cells || !is_insertable({c, r}) || !ground_.touches({c, r})) continue;
       nearest_cells = away;
       nearest = GridNode{c, r};
     }
@@ -569,7 +604,7 @@ Candidate GreedyMesher::worst_crossing_of_edge(Face f, int i) const {
   const auto look = [&](const GridNode& p, const GridNode& q, std::int32_t column,
                         std::int32_t row) {
     const double error_m = crossing_error_m(pa, pb, position(p), position(q));
-    if (error_m > worst.error_m && !is_resolved({column, row}))
+    if (error_m > worst.error_m && !is_settled({column, row}))
       worst = {error_m, index({column, row}) | kResolveCell};
   };
   if (affine_) {
@@ -608,7 +643,7 @@ Candidate GreedyMesher::worst_crossing_in_box(const GridNode& a, const GridNode&
       if (!ground_(c, r)) continue;
       const GridNode nw{c, r}, ne{c + 1, r}, sw{c, r + 1}, se{c + 1, r + 1};
       const std::uint32_t cell = index(nw);
-      if (is_resolved(nw)) continue;
+      if (is_settled(nw)) continue;
       look(nw, ne, cell);
       look(sw, se, cell);
       look(nw, sw, cell);
@@ -690,6 +725,15 @@ Mesh GreedyMesher::result() {
     mesh.tin.vertices.push_back(grid_.positions[sample]);
     mesh.sample_of_vertex.push_back(sample);
   }
+  if (!settled_.empty()) {
+    settled_.clear();
+    for (const Face f : cdt_.finite_face_handles()) {
+      if (!f->info().ground) continue;
+      f->info().sample_error_m =
+          worst_sample({corner(f, 0), corner(f, 1), corner(f, 2)}, f).error_m;
+      f->info().edge_error_m = worst_crossing(f).error_m;
+    }
+  }
   for (const Face f : cdt_.finite_face_handles()) {
     if (!f->info().ground) continue;
     if (!affine_ &&
@@ -706,18 +750,17 @@ Mesh GreedyMesher::result() {
   }
   mesh.error_over_surface_m = std::max(mesh.error_over_surface_m, mesh.error_at_samples_m);
   mesh.cell_ambiguity_m = cell_ambiguity_m();
-  mesh.lost_samples = count_lost_samples(grid_, ground_);
+  mesh.lost_samples = count_lost_samples(grid_, range_);
   copy_triangles(mesh);
   return mesh;
 }
 
 Mesh GreedyMesher::run() {
-  if (ground_.count() == 0)
-    throw Error(
-        ErrorCode::kInput,
-        "mesh: no cell of the " + std::to_string(grid_.columns) + " x " +
-            std::to_string(grid_.rows) +
-            " samples has four known corners; at least one is wanted; check the nodata value");
+  if (ground_.count() == 0) {
+    Mesh none;
+    none.lost_samples = count_lost_samples(grid_, range_);
+    return none;
+  }
   insert_border();
   goal_m_ = std::max(options_.max_error_m.value_or(0.0), kErrorRoundingM / 2);
   const std::uint32_t budget = options_.vertex_budget.value_or(kNone);
@@ -732,14 +775,42 @@ Mesh GreedyMesher::run() {
   return mesh;
 }
 
-}  // namespace
-
-Mesh mesh_samples(const SampleGrid& grid, const MeshOptions& options, const Progress& progress) {
+void check_options(const SampleGrid& grid, const MeshOptions& options) {
   assert(options.max_error_m.has_value() != options.vertex_budget.has_value());
   assert(!options.max_error_m || *options.max_error_m >= 0);
   assert(grid.columns <= kMeshReachCells && grid.rows <= kMeshReachCells);
   assert(grid.positions.size() <= kTargetMask);
-  return GreedyMesher(grid, options, progress).run();
+}
+
+}  // namespace
+
+Mesh mesh_samples(const SampleGrid& grid, const MeshOptions& options, const Progress& progress) {
+  check_options(grid, options);
+  Mesh mesh = GreedyMesher(grid, all_samples(grid), options, progress).run();
+  if (mesh.tin.triangles.empty())
+    throw Error(
+        ErrorCode::kInput,
+        "mesh: no cell of the " + std::to_string(grid.columns) + " x " + std::to_string(grid.rows) +
+            " samples has four known corners; at least one is wanted; check the nodata value");
+  return mesh;
+}
+
+Mesh mesh_tile(const TileScheme& scheme, const TileId& tile, const SampleGrid& window,
+               const MeshOptions& options, const Progress& progress) {
+  check_options(window, options);
+  assert(options.max_error_m.has_value());
+  const TileWindow own = scheme.window(tile), with_halo = scheme.window_with_halo(tile);
+  assert(window.columns == with_halo.columns && window.rows == with_halo.rows);
+  const GridNode first{(own.first_column - with_halo.first_column) / own.stride,
+                       (own.first_row - with_halo.first_row) / own.stride};
+  const SampleRange range{first, {first.column + own.columns - 1, first.row + own.rows - 1}};
+  Mesh mesh = GreedyMesher(window, range, options, progress).run();
+  for (std::int64_t& sample : mesh.sample_of_vertex) {
+    const std::int64_t column = sample % window.columns, row = sample / window.columns;
+    sample = (with_halo.first_row + row * own.stride) * scheme.columns() +
+             (with_halo.first_column + column * own.stride);
+  }
+  return mesh;
 }
 
 }  // namespace scarp

@@ -92,6 +92,9 @@ MeasuredError measure_error(const SampleGrid& grid, const Mesh& mesh);
 /// vertices are their samples; Delaunay in the sample plane but across the border; the border runs
 /// along sample edges with ground on its inner side only; the area is that of the ground, exactly.
 /// Requires every vertex to be a sample. Cost: O(n log n).
-std::optional<std::string> check_mesh(const SampleGrid& grid, const Mesh& mesh);
+/// @param tile_cells  of a mesh that is welded of tiles of so many cells: their edges are where the
+///                    whole need not be Delaunay, and no triangle crosses one
+std::optional<std::string> check_mesh(const SampleGrid& grid, const Mesh& mesh,
+                                      std::optional<std::int32_t> tile_cells = {});
 
 }  // namespace scarp

@@ -62,6 +62,7 @@ std::vector<std::vector<std::uint8_t>> fuzz_seeds() {
   std::vector<std::vector<std::uint8_t>> seeds;
   for (const std::vector<std::byte>& bytes :
        {tin_writer(tin, samples).to_bytes(), tin_writer(Tin{}).to_bytes(),
+        compact_tin_writer(tin, samples).to_bytes(),
         horizon_writer(test::small_horizons(tin)).to_bytes(),
         groups_writer(test::small_groups(tin)).to_bytes(),
         groups_writer(test::small_certified_groups(tin)).to_bytes(),

@@ -154,6 +154,70 @@ void describe(GDALDataset& dataset, const RasterLayer& layer, const std::string&
   band.SetColorTable(&table);
 }
 
+namespace {
+
+/// The options of the COG driver that all layers share.
+CPLStringList cog_options(const char* predictor, const char* resampling) {
+  CPLStringList options;
+  options.SetNameValue("COMPRESS", "DEFLATE");
+  options.SetNameValue("PREDICTOR", predictor);
+  options.SetNameValue("LEVEL", "1");  // the most of what can be had, at a third of the time
+  options.SetNameValue("BIGTIFF", "IF_SAFER");
+  options.SetNameValue("NUM_THREADS", std::to_string(thread_count()).c_str());
+  options.SetNameValue("OVERVIEW_RESAMPLING", resampling);
+  return options;
+}
+
+/// Removes a file at the end, whatever happens.
+struct WorkFile {
+  std::string path;
+  ~WorkFile() {
+    std::error_code ignored;
+    std::filesystem::remove(path, ignored);
+  }
+};
+
+/// A file of pieces on the disk: quickly packed, in the tiles of the final one.
+GDALDatasetUniquePtr piece_dataset(const std::string& work_path, const RasterLayer& layer,
+                                   const GdalSession& session, const std::string& path) {
+  GDALDriver* driver = GetGDALDriverManager()->GetDriverByName("GTiff");
+  if (driver == nullptr) session.fail(path);
+  CPLStringList options;
+  options.SetNameValue("TILED", "YES");
+  options.SetNameValue("BLOCKXSIZE", "512");
+  options.SetNameValue("BLOCKYSIZE", "512");
+  options.SetNameValue("COMPRESS", "DEFLATE");
+  options.SetNameValue("ZLEVEL", "1");
+  options.SetNameValue("BIGTIFF", "IF_SAFER");
+  options.SetNameValue("SPARSE_OK", "TRUE");
+  GDALDatasetUniquePtr dataset(
+      driver->Create(work_path.c_str(), layer.columns, layer.rows, 1, GDT_Int32, options.List()));
+  if (!dataset) session.fail(path);
+  describe(*dataset, layer, path);
+  return dataset;
+}
+
+/// GDAL 3.6 does not report what fails while it closes a file: reads it all again.
+void check_readable(const std::string& built, const GdalSession& session, const std::string& path) {
+  const GDALDatasetUniquePtr dataset(GDALDataset::Open(built.c_str(), GDAL_OF_RASTER));
+  if (!dataset) session.fail(path);
+  const auto read = [&](GDALRasterBand& band) {
+    int columns = 0, rows = 0;
+    band.GetBlockSize(&columns, &rows);
+    std::vector<std::int32_t> block(static_cast<std::size_t>(columns) *
+                                    static_cast<std::size_t>(rows));
+    for (int row = 0; row * rows < band.GetYSize(); ++row)
+      for (int column = 0; column * columns < band.GetXSize(); ++column)
+        if (band.ReadBlock(column, row, block.data()) != CE_None) session.fail(path);
+  };
+  GDALRasterBand& band = *dataset->GetRasterBand(1);
+  read(band);
+  for (int i = 0; i < band.GetOverviewCount(); ++i) read(*band.GetOverview(i));
+  session.check(path);
+}
+
+}  // namespace
+
 void write_geotiff_cog(const std::string& path, const RasterLayer& layer, Existing existing) {
   const LayerData data = data_of(layer.samples);
   assert(layer.columns >= 1 && layer.rows >= 1);
@@ -166,13 +230,7 @@ void write_geotiff_cog(const std::string& path, const RasterLayer& layer, Existi
   describe(*source, layer, path);
   if (!layer.saves_memory) build_overviews(*source, data);
   session.check(path);
-  CPLStringList options;
-  options.SetNameValue("COMPRESS", "DEFLATE");
-  options.SetNameValue("PREDICTOR", data.predictor);
-  options.SetNameValue("LEVEL", "1");  // the most of what can be had, at a third of the time
-  options.SetNameValue("BIGTIFF", "IF_SAFER");
-  options.SetNameValue("NUM_THREADS", std::to_string(thread_count()).c_str());
-  options.SetNameValue("OVERVIEW_RESAMPLING", data.is_float ? "AVERAGE" : "NEAREST");
+  CPLStringList options = cog_options(data.predictor, data.is_float ? "AVERAGE" : "NEAREST");
   GDALDriver* driver = GetGDALDriverManager()->GetDriverByName("COG");
   if (driver == nullptr) session.fail(path);
   const std::string built = layer.saves_memory ? file.part_path() : session.folder() + "/layer.tif";
@@ -187,6 +245,47 @@ void write_geotiff_cog(const std::string& path, const RasterLayer& layer, Existi
   } else {
     file.append(session.bytes_of(built, path));
   }
+  file.commit();
+}
+
+void write_geotiff_cog_in_pieces(const std::string& path, const std::string& work_path,
+                                 const RasterLayer& layer,
+                                 const std::function<void(const TakePiece&)>& give,
+                                 Existing existing) {
+  assert(layer.columns >= 1 && layer.rows >= 1 && layer.nodata && layer.more_bands.empty());
+  PartFile file(path, existing);
+  const GdalSession session;
+  const WorkFile work{work_path};
+  GDALDatasetUniquePtr pieces = piece_dataset(work_path, layer, session, path);
+  give([&](std::int32_t column, std::int32_t row, std::int32_t columns, std::int32_t rows,
+           std::span<const std::int32_t> samples) {
+    assert(samples.size() == static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+    GDALRasterBand& band = *pieces->GetRasterBand(1);
+    std::vector<std::int32_t> merged(samples.size());
+    if (band.RasterIO(GF_Read, column, row, columns, rows, merged.data(), columns, rows, GDT_Int32,
+                      0, 0) != CE_None)
+      session.fail(path);
+    const auto nodata = static_cast<std::int32_t>(*layer.nodata);
+    for (std::size_t i = 0; i < samples.size(); ++i)
+      if (samples[i] != nodata) merged[i] = samples[i];
+    if (band.RasterIO(GF_Write, column, row, columns, rows, merged.data(), columns, rows, GDT_Int32,
+                      0, 0) != CE_None)
+      session.fail(path);
+  });
+  pieces.reset();
+  session.check(path);
+  pieces.reset(GDALDataset::Open(work_path.c_str(), GDAL_OF_RASTER));
+  if (!pieces) session.fail(path);
+  GDALDriver* driver = GetGDALDriverManager()->GetDriverByName("COG");
+  if (driver == nullptr) session.fail(path);
+  CPLStringList options = cog_options("YES", "NEAREST");
+  GDALDatasetUniquePtr cog(driver->CreateCopy(file.part_path().c_str(), pieces.get(), TRUE,
+                                              options.List(), nullptr, nullptr));
+  if (!cog) session.fail(path);
+  cog.reset();  // closing writes the rest
+  session.check(path);
+  check_readable(file.part_path(), session, path);
+  file.take_over();
   file.commit();
 }
 

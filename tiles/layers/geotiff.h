@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <span>
@@ -53,5 +54,19 @@ struct RasterLayer {
 /// not to be replaced, or the CRS is not WKT. Nothing is left behind. Memory: overviews (a third of
 /// the samples) and the compressed file; blocks only where it saves memory.
 void write_geotiff_cog(const std::string& path, const RasterLayer& layer, Existing existing);
+
+/// Takes a rectangle of a layer's samples, [rows * columns], row by row from the north.
+using TakePiece = std::function<void(std::int32_t column, std::int32_t row, std::int32_t columns,
+                                     std::int32_t rows, std::span<const std::int32_t> samples)>;
+
+/// The same for a layer of int32 that is never held whole: `give` hands over its pieces.
+/// Later ones lie on top, except where they are nodata; what none covers is nodata. The layer's own
+/// samples are left empty, and it has one band and nodata (asserted).
+/// @param work_path  a file for the pieces, which is removed again
+/// Memory: GDAL's cache. Errors: as above, and what `give` throws.
+void write_geotiff_cog_in_pieces(const std::string& path, const std::string& work_path,
+                                 const RasterLayer& layer,
+                                 const std::function<void(const TakePiece&)>& give,
+                                 Existing existing);
 
 }  // namespace scarp

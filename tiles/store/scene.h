@@ -53,18 +53,22 @@ bool is_scene(const std::string& path);
 /// "tiles/0/0/0.tin" for tile "0/0/0" and kind "tin".
 std::string tile_file_name(const std::string& tile, const std::string& kind);
 
-/// Makes a scene in "<path>.part-<pid>-<random>" beside its final name; finish() writes scene.json
-/// and renames, so that the name always shows a whole scene or none.
+/// What a build keeps for itself in the folder that grows; finish() removes it.
+inline constexpr char kWorkFolder[] = "work";
+
+/// Makes a scene in "<path>.part" beside its final name; finish() writes scene.json and renames, so
+/// that the name always shows a whole scene or none.
 ///
 /// Without finish() the folder is removed by the destructor, or stays for a later kResume after
 /// keep_unfinished() or a kill. What stays holds whole files only, apart from "*.part".
-/// Errors, of all members: kInput where the output may not be replaced or is no scene, kResource
-/// from the disk.
+/// Errors, of all members: kInput where the output may not be replaced or is no scene, or an
+/// unfinished build is in the way; kResource from the disk, or where another process builds here.
 class SceneWriter {
  public:
   enum class Start {
-    kAnew,
-    kResume,  ///< go on in the one unfinished folder, if there is any
+    kAnew,    ///< in a new folder; an unfinished one with work in it is replaced by kReplace only
+    kResume,  ///< go on in the unfinished folder, or begin where there is none
+    kShare,   ///< the same, beside other processes that do so
   };
 
   /// Existing::kReplace replaces a scene or an empty folder, and nothing else.
@@ -82,13 +86,19 @@ class SceneWriter {
   /// Size and checksum of a file that lies there, for the description. Reads it once.
   StoredFile record(const std::string& name, const std::string& kind) const;
 
-  void keep_unfinished() { keep_ = true; }
+  void keep_unfinished(bool keep = true) { keep_ = keep; }
 
-  /// The last call. Requires check_description to find nothing (else Error{kUsage}) and every
-  /// listed file to be there with its size (else Error{kCorrupt}).
+  /// The last call. Requires check_description to find nothing (else Error{kUsage}), every
+  /// listed file to be there with its size (else Error{kCorrupt}), and that nobody shares the
+  /// folder (else Error{kResource}).
   void finish(const SceneDescription& description);
 
+  /// Renames a folder whose scene.json was written already: by a finish() that was killed.
+  void finish_again();
+
  private:
+  void rename_to_scene();
+
   std::string path_;
   std::string folder_;
   Existing existing_;
@@ -96,8 +106,8 @@ class SceneWriter {
   bool keep_ = false;
 };
 
-/// Unfinished folders beside a scene's name, sorted.
-std::vector<std::string> unfinished_scenes(const std::string& path);
+/// Where a build of this scene grows: "<path>.part".
+std::string unfinished_scene(const std::string& path);
 
 /// Something that check_scene found.
 struct SceneFinding {

@@ -35,22 +35,6 @@ bool is_proper_name(const std::string& name) {
   });
 }
 
-bool is_tile_id(const std::string& id) {
-  int parts = 1;
-  std::size_t digits = 0;
-  for (const char c : id) {
-    if (c == '/' && digits > 0) {
-      ++parts;
-      digits = 0;
-    } else if (c >= '0' && c <= '9' && digits < 9) {
-      ++digits;
-    } else {
-      return false;
-    }
-  }
-  return parts == 3 && digits > 0;
-}
-
 template <class Numbers>
 bool all_finite(const Numbers& numbers) {
   return std::ranges::all_of(numbers, [](double x) { return std::isfinite(x); });
@@ -69,8 +53,10 @@ std::optional<std::string> check_file(const StoredFile& file, std::set<std::stri
 std::optional<std::string> check_files(const SceneDescription& scene) {
   std::set<std::string> names, ids;
   for (const SceneTile& tile : scene.tiles) {
-    if (!is_tile_id(tile.id)) return fmt::format("tile id \"{}\" is not level/column/row", tile.id);
+    if (!tile_named(tile.id)) return fmt::format("tile id \"{}\" is not level/column/row", tile.id);
     if (!ids.insert(tile.id).second) return fmt::format("tile \"{}\" is listed twice", tile.id);
+    if (tile.contents && !(all_finite(tile.contents->low) && all_finite(tile.contents->high)))
+      return fmt::format("the bounds of tile \"{}\" are not finite", tile.id);
     for (const StoredFile& file : tile.files) {
       if (auto wrong = check_file(file, names)) return wrong;
     }
@@ -94,6 +80,17 @@ Json to_json(const std::vector<StoredFile>& files) {
   Json list = Json::array();
   for (const StoredFile& file : files) list.push_back(to_json(file));
   return list;
+}
+
+Json to_json(const SceneTile& tile) {
+  Json json = {{"id", tile.id}, {"files", to_json(tile.files)}};
+  if (tile.contents)
+    json["contents"] = {{"low", tile.contents->low},
+                        {"high", tile.contents->high},
+                        {"vertices", tile.contents->vertices},
+                        {"triangles", tile.contents->triangles},
+                        {"groups", tile.contents->groups}};
+  return json;
 }
 
 Json to_json(const EarthModel& earth) {
@@ -186,8 +183,20 @@ SourceFile source_from(const Place& place) {
   return {place.at("name").text(), place.at("size").size(), place.at("xxh128").checksum()};
 }
 
+TileContents contents_from(const Place& place) {
+  TileContents contents;
+  contents.low = place.at("low").numbers<3>();
+  contents.high = place.at("high").numbers<3>();
+  contents.vertices = place.at("vertices").size();
+  contents.triangles = place.at("triangles").size();
+  contents.groups = place.at("groups").size();
+  return contents;
+}
+
 SceneTile tile_from(const Place& place) {
-  return {place.at("id").text(), place.at("files").list(stored_file_from)};
+  SceneTile tile{place.at("id").text(), place.at("files").list(stored_file_from), {}};
+  if (place.value.contains("contents")) tile.contents = contents_from(place.at("contents"));
+  return tile;
 }
 
 EarthModel earth_from(const Place& place) {
@@ -239,6 +248,22 @@ bool checksum_fits(std::string_view text) {
 
 }  // namespace
 
+TileId tile_id(const SceneTile& tile) {
+  const std::optional<TileId> id = tile_named(tile.id);
+  assert(id);
+  return *id;
+}
+
+std::vector<std::size_t> finest_tiles(const SceneDescription& scene) {
+  std::int32_t finest = 0;
+  for (const SceneTile& tile : scene.tiles) finest = std::max(finest, tile_id(tile).level);
+  std::vector<std::size_t> tiles;
+  for (std::size_t i = 0; i < scene.tiles.size(); ++i)
+    if (tile_id(scene.tiles[i]).level == finest) tiles.push_back(i);
+  std::ranges::sort(tiles, {}, [&](std::size_t i) { return tile_id(scene.tiles[i]); });
+  return tiles;
+}
+
 std::optional<std::string> check_description(const SceneDescription& scene) {
   if (!(scene.earth.refraction >= 0 && scene.earth.refraction <= 1))
     return fmt::format("refraction {} is not in 0 to 1", scene.earth.refraction);
@@ -261,8 +286,7 @@ std::string scene_to_json(const SceneDescription& scene) {
     sources.push_back(
         {{"name", source.name}, {"size", source.size}, {"xxh128", to_hex(source.checksum)}});
   Json tiles = Json::array();
-  for (const SceneTile& tile : scene.tiles)
-    tiles.push_back({{"id", tile.id}, {"files", to_json(tile.files)}});
+  for (const SceneTile& tile : scene.tiles) tiles.push_back(to_json(tile));
   const Json json = {{"format", "scarp scene"},
                      {"version", kSceneVersion},
                      {"made_by", scene.made_by},

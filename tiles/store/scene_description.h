@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/terrain/tile_scheme.h"
 #include "tiles/store/checksum.h"
 
 /// What scene.json says, as plain data. docs/formats.md has the file's members.
@@ -62,9 +63,20 @@ struct StoredFile {
   friend bool operator==(const StoredFile&, const StoredFile&) = default;
 };
 
+/// What a tile holds, so that readers open only those that they need.
+struct TileContents {
+  std::array<double, 3> low{}, high{};  ///< bounds of the vertices, flattened, metres
+  std::uint64_t vertices = 0;
+  std::uint64_t triangles = 0;
+  std::uint64_t groups = 0;  ///< leaves; 0 where the tile has none
+
+  friend bool operator==(const TileContents&, const TileContents&) = default;
+};
+
 struct SceneTile {
   std::string id;  ///< "level/column/row", such as "0/0/0"
   std::vector<StoredFile> files;
+  std::optional<TileContents> contents = {};  ///< none in scenes of an earlier version
 
   friend bool operator==(const SceneTile&, const SceneTile&) = default;
 };
@@ -83,6 +95,13 @@ struct SceneDescription {
 
   friend bool operator==(const SceneDescription&, const SceneDescription&) = default;
 };
+
+/// The place of a tile. Requires a proper id (asserted).
+TileId tile_id(const SceneTile& tile);
+
+/// Tiles of the finest level that has any, which cover the scene: by rising row, then column.
+/// Groups of a scene are counted on from one to the next in this order. Indices into scene.tiles.
+std::vector<std::size_t> finest_tiles(const SceneDescription& scene);
 
 /// Names what is wrong with a description, or nothing: numbers finite and in range, tile ids and
 /// file names proper and unique. A proper file name is relative and never leaves the folder.

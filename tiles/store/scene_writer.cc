@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr char kPartMark[] = ".part-";
+constexpr char kPartMark[] = ".part";
 
 std::string without_trailing_slashes(std::string path) {
   while (path.size() > 1 && path.back() == '/') path.pop_back();
@@ -42,23 +42,39 @@ OpenFile open_folder(const std::string& path) {
   return folder;
 }
 
-/// One writer a folder: a lock that ends with the process.
-bool try_lock(const OpenFile& folder) {
-  return ::flock(folder.descriptor(), LOCK_EX | LOCK_NB) == 0;
+/// One writer a folder, or several that share it: a lock that ends with the process.
+bool try_lock(const OpenFile& folder, int operation) {
+  return ::flock(folder.descriptor(), operation | LOCK_NB) == 0;
 }
 
-std::string folder_to_resume(const std::string& path) {
-  const std::vector<std::string> found = unfinished_scenes(path);
-  if (found.size() > 1)
-    throw Error(ErrorCode::kInput,
-                fmt::format("'{}': there are {} unfinished builds ('{}', ...); one was expected; "
-                            "remove the others",
-                            path, found.size(), found[0]));
-  return found.empty() ? "" : found[0];
+[[noreturn]] void throw_busy(const std::string& folder) {
+  throw Error(
+      ErrorCode::kResource,
+      fmt::format("'{}': another process is building here; wait for it or stop it", folder));
 }
 
-void make_folder(const std::string& path) {
-  if (::mkdir(path.c_str(), 0777) != 0) throw_write_error(path, errno);
+/// Whether the path still names this folder.
+bool is_at(const std::string& path, const OpenFile& folder) {
+  struct stat named, opened;
+  return ::stat(path.c_str(), &named) == 0 && ::fstat(folder.descriptor(), &opened) == 0 &&
+         named.st_dev == opened.st_dev && named.st_ino == opened.st_ino;
+}
+
+/// Whether an unfinished folder holds something that a resumed build would not have to do again.
+bool holds_work(const std::string& folder) {
+  std::error_code ignored;
+  const std::string work = folder + "/" + kWorkFolder;
+  return fs::exists(folder + "/" + kSceneJson, ignored) ||
+         (fs::is_directory(work, ignored) && !fs::is_empty(work, ignored));
+}
+
+void remove_contents(const std::string& folder) {
+  std::error_code failure;
+  for (const auto& entry : fs::directory_iterator(folder, failure)) {
+    fs::remove_all(entry.path(), failure);
+    if (failure) break;
+  }
+  if (failure) throw_write_error(folder, failure.value());
 }
 
 void flush_folders(const std::string& root) {
@@ -85,34 +101,28 @@ void check_listed(const StoredFile& file, const std::string& folder) {
 
 }  // namespace
 
-std::vector<std::string> unfinished_scenes(const std::string& path) {
-  const std::string start =
-      fs::path(without_trailing_slashes(path)).filename().string() + kPartMark;
-  std::vector<std::string> found;
-  std::error_code failure;
-  for (fs::directory_iterator i(folder_of(without_trailing_slashes(path)), failure), end;
-       !failure && i != end; i.increment(failure)) {
-    std::error_code ignored;
-    if (i->path().filename().string().starts_with(start) && i->is_directory(ignored))
-      found.push_back(i->path().string());
-  }
-  std::sort(found.begin(), found.end());
-  return found;
+std::string unfinished_scene(const std::string& path) {
+  return without_trailing_slashes(path) + kPartMark;
 }
 
 SceneWriter::SceneWriter(std::string path, Existing existing, Start start)
     : path_(without_trailing_slashes(std::move(path))), existing_(existing) {
   check_target(path_, existing_);
-  if (start == Start::kResume) folder_ = folder_to_resume(path_);
-  if (folder_.empty()) {
-    folder_ = path_ + kPartMark + unique_suffix();
-    make_folder(folder_);
+  const std::string folder = unfinished_scene(path_);
+  if (::mkdir(folder.c_str(), 0777) != 0 && errno != EEXIST) throw_write_error(folder, errno);
+  lock_ = open_folder(folder);
+  // The folder may have become a scene, or been removed, before it was locked.
+  if (!try_lock(lock_, start == Start::kShare ? LOCK_SH : LOCK_EX) || !is_at(folder, lock_))
+    throw_busy(folder);
+  if (start == Start::kAnew) {
+    if (existing_ == Existing::kRefuse && holds_work(folder))
+      throw Error(ErrorCode::kInput,
+                  fmt::format("'{}': holds an unfinished build; give --resume to go on with it, "
+                              "--overwrite to begin anew, or remove it",
+                              folder));
+    remove_contents(folder);
   }
-  lock_ = open_folder(folder_);
-  if (!try_lock(lock_))
-    throw Error(
-        ErrorCode::kResource,
-        fmt::format("'{}': another process is building here; wait for it or stop it", folder_));
+  folder_ = folder;  // from here on the destructor removes it
 }
 
 SceneWriter::~SceneWriter() {
@@ -136,12 +146,25 @@ StoredFile SceneWriter::record(const std::string& name, const std::string& kind)
 void SceneWriter::finish(const SceneDescription& description) {
   if (const auto wrong = check_description(description))
     throw Error(ErrorCode::kUsage, fmt::format("'{}': {}", path_, *wrong));
+  if (!try_lock(lock_, LOCK_EX)) throw_busy(folder_);
   for (const SceneTile& tile : description.tiles) {
     for (const StoredFile& file : tile.files) check_listed(file, folder_);
   }
   for (const StoredFile& file : description.layers) check_listed(file, folder_);
   const std::string text = scene_to_json(description);
   write_file(folder_ + "/" + kSceneJson, std::as_bytes(std::span(text)), Existing::kReplace);
+  rename_to_scene();
+}
+
+void SceneWriter::finish_again() {
+  if (!try_lock(lock_, LOCK_EX)) throw_busy(folder_);
+  rename_to_scene();
+}
+
+void SceneWriter::rename_to_scene() {
+  std::error_code failure;
+  fs::remove_all(folder_ + "/" + kWorkFolder, failure);
+  if (failure) throw_write_error(folder_ + "/" + kWorkFolder, failure.value());
   flush_folders(folder_);
   check_target(path_, existing_);
   const int reason = rename_to_new(folder_, path_);

@@ -25,9 +25,21 @@ SectionFileWriter tin_writer(const Tin& tin, std::span<const std::int64_t> sampl
 void write_tin(const std::string& path, const Tin& tin,
                std::span<const std::int64_t> sample_of_vertex, Existing existing);
 
-/// The TIN of a file, checked so far that no walk over it leaves its arrays: indices in range,
-/// lattice coordinates, counter-clockwise triangles, neighbours mutual and across the right edge.
-/// check_tin finds the rest. Errors: kCorrupt. Cost: O(n).
+/// The same in about a third of the bytes, for scenes of many tiles: heights and places in lattice
+/// steps from a corner, corners of triangles and samples as differences, no neighbours, which are
+/// found again. read_tin gives back bit for bit what was written.
+///
+/// Requires besides: vertices within 2^19 m of each other, as those of a tile are (asserted).
+SectionFileWriter compact_tin_writer(const Tin& tin,
+                                     std::span<const std::int64_t> sample_of_vertex);
+
+/// Errors: those of PartFile.
+void write_compact_tin(const std::string& path, const Tin& tin,
+                       std::span<const std::int64_t> sample_of_vertex, Existing existing);
+
+/// The TIN of a file, of either kind, checked so far that no walk over it leaves its arrays:
+/// indices in range, lattice coordinates, counter-clockwise triangles, neighbours mutual and across
+/// the right edge. check_tin finds the rest. Errors: kCorrupt. Cost: O(n).
 Tin read_tin(const SectionFile& file);
 
 /// [vertices], or empty where the file does not tell. Each is -1 or more; the raster's size is not

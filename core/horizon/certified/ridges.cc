@@ -32,23 +32,32 @@ RidgeEdges ridge_edges_of(const Tin& tin) {
   return ridges;
 }
 
-void Ridges::cross(const RidgeEdges& ridges, const FanView& view, double width_m) {
+void Ridges::cross(const RidgeEdges& ridges, const FanView& view, double width_m,
+                   const RidgeRange& range) {
   width_m_ = width_m;
   low_v_m_ = view.low_v_m;
-  const auto strips = static_cast<std::size_t>((view.high_v_m - view.low_v_m) / width_m) + 1;
+  const auto strip_of = [&](double v_m) {
+    return static_cast<std::ptrdiff_t>((std::clamp(v_m, view.low_v_m, view.high_v_m) - low_v_m_) /
+                                       width_m);
+  };
+  first_strip_ = strip_of(range.low_v_m);
+  const std::ptrdiff_t last_strip = strip_of(range.high_v_m);
+  const auto strips = static_cast<std::size_t>(last_strip - first_strip_ + 1);
   first_.assign(strips + 1, 0);
   /// Calls visit(strip, u, z) for the middle lines that an edge crosses.
   const auto visit_crossings = [&](const RidgeEdges::Edge& edge, auto visit) {
     const FanPlace& p = view.vertices[edge[0]];
     const FanPlace& q = view.vertices[edge[1]];
+    if (p.u_m < range.low_u_m && q.u_m < range.low_u_m) return;
     const double low = (std::min(p.v_m, q.v_m) - low_v_m_) / width_m - 0.5;
     const double high = (std::max(p.v_m, q.v_m) - low_v_m_) / width_m - 0.5;
-    const auto last = static_cast<std::ptrdiff_t>(std::floor(high));
-    for (auto s = static_cast<std::ptrdiff_t>(std::ceil(low)); s <= last; ++s) {
-      if (s < 0 || s >= static_cast<std::ptrdiff_t>(strips) || !(p.v_m != q.v_m)) continue;
+    const auto last = std::min(last_strip, static_cast<std::ptrdiff_t>(std::floor(high)));
+    for (auto s = std::max(first_strip_, static_cast<std::ptrdiff_t>(std::ceil(low))); s <= last;
+         ++s) {
+      if (!(p.v_m != q.v_m)) continue;
       const double v_m = low_v_m_ + (static_cast<double>(s) + 0.5) * width_m;
       const double share = (v_m - p.v_m) / (q.v_m - p.v_m);
-      visit(static_cast<std::size_t>(s), p.u_m + share * (q.u_m - p.u_m),
+      visit(static_cast<std::size_t>(s - first_strip_), p.u_m + share * (q.u_m - p.u_m),
             p.z_m + share * (q.z_m - p.z_m));
     }
   };
@@ -70,7 +79,7 @@ void Ridges::cross(const RidgeEdges& ridges, const FanView& view, double width_m
 }
 
 std::span<const RidgeCrossing> Ridges::along(double v_m) const {
-  const double strip = (v_m - low_v_m_) / width_m_;
+  const double strip = (v_m - low_v_m_) / width_m_ - static_cast<double>(first_strip_);
   const auto s =
       static_cast<std::size_t>(std::clamp(strip, 0.0, static_cast<double>(first_.size() - 2)));
   return {crossings_.data() + first_[s], first_[s + 1] - first_[s]};

@@ -34,19 +34,28 @@ struct RidgeCrossing {
   std::uint32_t edge;  ///< into RidgeEdges::edges
 };
 
+/// The part of a fan's frame from which ridges are looked for: ahead of low_u_m, in strips that
+/// hold v from low_v_m to high_v_m.
+struct RidgeRange {
+  double low_u_m, low_v_m, high_v_m;
+};
+
 /// The ridges of a surface along a fan: for strips of equal width along its axis, the crossings of
 /// their middle lines by rising u. Tells where to look for what hides; what is hidden follows from
 /// the edges themselves. Side: none; heights and places are rounded.
 class Ridges {
  public:
-  /// Cost: O(edges * (1 + length / width)) time, 12 bytes a crossing.
-  void cross(const RidgeEdges& ridges, const FanView& view, double width_m);
+  /// Which strips there are and what they hold ahead of range.low_u_m does not depend on the range.
+  /// Cost: O(edges + crossings) time, 12 bytes a crossing.
+  void cross(const RidgeEdges& ridges, const FanView& view, double width_m,
+             const RidgeRange& range);
 
-  /// The crossings of the strip that holds v.
+  /// The crossings of the strip that holds v. Requires v in the range.
   std::span<const RidgeCrossing> along(double v_m) const;
 
  private:
   double low_v_m_ = 0, width_m_ = 1;
+  std::ptrdiff_t first_strip_ = 0;
   std::vector<std::size_t> first_;  // [strips + 1]
   std::vector<RidgeCrossing> crossings_;
 };

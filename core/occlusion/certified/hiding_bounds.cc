@@ -54,7 +54,7 @@ std::vector<std::int32_t> scattered_order(std::int32_t count) {
 class Bounding {
  public:
   Bounding(const Tin& tin, std::span<const GroupIndex> group_of_triangle, std::uint32_t groups,
-           const HidingOptions& options)
+           const HidingOptions& options, std::optional<std::size_t> own_triangles)
       : tin_(tin),
         options_(options),
         edges_(edges_of_groups(tin, group_of_triangle, groups)),
@@ -65,16 +65,18 @@ class Bounding {
     const double depth_m = bounds.high.y_m - bounds.low.y_m;
     origin_x_m_ = round_to_lattice(bounds.low.x_m + width_m / 2);
     origin_y_m_ = round_to_lattice(bounds.low.y_m + depth_m / 2);
+    const std::size_t own = own_triangles.value_or(tin.triangles.size());
     double area_m2 = 0, radius_m = 0;
-    for (const auto& [a, b, c] : tin.triangles) {
+    for (const auto& [a, b, c] : std::span(tin.triangles).first(own)) {
       const Position &p = tin.vertices[a], &q = tin.vertices[b], &r = tin.vertices[c];
       area_m2 += ((q.x_m - p.x_m) * (r.y_m - p.y_m) - (q.y_m - p.y_m) * (r.x_m - p.x_m)) / 2;
     }
     for (const Circle& circle : bounds_.circle) radius_m += circle.radius_m / groups;
-    unit_m_ = std::sqrt(2 * area_m2 / static_cast<double>(tin.triangles.size()));
-    // The finer rings where they reach over the whole surface.
+    unit_m_ = std::sqrt(2 * area_m2 / static_cast<double>(own));
+    // The finer rings where they reach over the whole surface; the same for all tiles of a scene.
     const double reach = std::hypot(width_m, depth_m) / radius_m;
-    bounds_.layout = {options.sectors, reach < ring_start({8, 3}, kRings - 1) ? 3 : 2};
+    const bool is_all = own == tin.triangles.size();
+    bounds_.layout = {options.sectors, is_all && reach < ring_start({8, 3}, kRings - 1) ? 3 : 2};
     // No sector is as much as a tenth wider than equal ones would be.
     sagitta_ = static_cast<float>(1 - std::cos(1.1 * std::numbers::pi / options.sectors));
     bounds_.slope.assign(
@@ -96,7 +98,7 @@ class Bounding {
         view_along(fan_of(options_.fans, order[static_cast<std::size_t>(begin) + i]), tin_,
                    origin_x_m_, origin_y_m_, views[i]);
         turns[i].turn_to(bounds_.layout, views[i].fan, rings);
-        ridges[i].cross(ridge_edges_, views[i], options_.width * unit_m_);
+        ridges[i].cross(ridge_edges_, views[i], options_.width * unit_m_, looked_from(views[i]));
       });
       parallel_for(bounds_.circle.size(), [&](std::size_t group) {
         for (std::size_t i = 0; i < count; ++i)
@@ -121,6 +123,20 @@ class Bounding {
       bounds_.height_m.push_back(top_m);
       bounds_.circle.push_back(enclosing_circle(convex_hull(std::move(corners))));
     }
+  }
+
+  /// Where the groups are, in the frame of a fan.
+  RidgeRange looked_from(const FanView& view) const {
+    RidgeRange range{HUGE_VAL, HUGE_VAL, -HUGE_VAL};
+    for (const Circle& circle : bounds_.circle) {
+      const FanPlace centre =
+          place_in(view.fan, circle.x_m - origin_x_m_, circle.y_m - origin_y_m_, 0);
+      const double reach_m = circle.radius_m * (1 + 0x1p-20) + 16 * view.error_m;
+      range.low_u_m = std::min(range.low_u_m, centre.u_m - reach_m);
+      range.low_v_m = std::min(range.low_v_m, centre.v_m - reach_m);
+      range.high_v_m = std::max(range.high_v_m, centre.v_m + reach_m);
+    }
+    return range;
   }
 
   /// Where cameras can be: about the slope to the ground in each cell, and no slope is enough where
@@ -450,10 +466,10 @@ class Bounding {
 
 HidingBounds bound_hiding(const Tin& tin, std::span<const GroupIndex> group_of_triangle,
                           std::uint32_t groups, const HidingOptions& options,
-                          const Progress& progress) {
+                          const Progress& progress, std::optional<std::size_t> own_triangles) {
   assert(group_of_triangle.size() == tin.triangles.size());
   if (groups == 0) return {};
-  return Bounding(tin, group_of_triangle, groups, options).run(progress);
+  return Bounding(tin, group_of_triangle, groups, options, own_triangles).run(progress);
 }
 
 }  // namespace scarp

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -53,8 +55,13 @@ struct HidingBounds {
 /// Cost: about fans * 1.5 us a triangle, and 384 bytes for each group and sector.
 /// Source: own; supporting planes as in Law and Tan 1999, for one ridge and all of a group's
 /// ground.
+/// @param own_triangles  of a tile in a scene: these come first, and only they have groups. The
+///                       others may be pieces that overlap or do not touch, as long as they lie
+///                       nowhere above true ground: an edge is only ever asked to hide what its own
+///                       plane hides. Without it all triangles are the tile's own.
 HidingBounds bound_hiding(const Tin& tin, std::span<const GroupIndex> group_of_triangle,
                           std::uint32_t groups, const HidingOptions& options,
-                          const Progress& progress = {});
+                          const Progress& progress = {},
+                          std::optional<std::size_t> own_triangles = {});
 
 }  // namespace scarp

@@ -58,13 +58,22 @@ TEST(SceneDescription, TextGoesThereAndBack) {
   scene.parameters["least"] = std::numeric_limits<std::int64_t>::min();
   scene.parameters["text"] = std::string("a \"b\"\n\t\\ \xC3\xA4");
   scene.sources[0].size = std::numeric_limits<std::uint64_t>::max();
-  scene.tiles = {{"0/0/0", {{"tiles/0/0/0.tin", "tin", 7, checksum_of({})}}}, {"3/1/2", {}}};
+  scene.tiles = {{"0/0/0", {{"tiles/0/0/0.tin", "tin", 7, checksum_of({})}}, {}},
+                 {"3/1/2", {}, {}}};
+  scene.tiles[1].contents = TileContents{{-1, 2, 3}, {4, 5.5, 1e-9}, 12, 20, 3};
   scene.layers = {{"layers/x.tif", "cog", 1, {}}};
   const std::string text = scene_to_json(scene);
   EXPECT_EQ(scene_from_json(text, "s"), scene);
   EXPECT_EQ(scene_to_json(scene_from_json(text, "s")), text);
   scene.sources[0].name = "caf\xE9.tif";  // not UTF-8
   EXPECT_EQ(scene_from_json(scene_to_json(scene), "s").sources[0].name, "caf\xEF\xBF\xBD.tif");
+}
+
+TEST(SceneDescription, FinestTilesGoByRowThenColumn) {
+  SceneDescription scene = test::small_description();
+  for (const char* id : {"2/10/0", "0/0/0", "2/0/1", "1/0/0", "2/2/0", "2/1/1"})
+    scene.tiles.push_back({id, {}, {}});
+  EXPECT_EQ(finest_tiles(scene), (std::vector<std::size_t>{4, 0, 2, 5}));
 }
 
 TEST(SceneDescription, EveryTruncationAndEveryFlippedByteIsAnError) {
@@ -156,7 +165,8 @@ TEST(SceneWriter, RefusesAnExistingOutput) {
       message_of([&] { write_scene(folder / "a", Existing::kRefuse, 2); }).find("exists already"),
       std::string::npos);
   SceneWriter late(folder / "b", Existing::kRefuse);
-  write_scene(folder / "b", Existing::kRefuse, 3);
+  write_scene(folder / "c", Existing::kRefuse, 3);
+  std::filesystem::rename(folder / "c", folder / "b");
   EXPECT_NE(message_of([&] { late.finish(test::small_description()); }).find("exists already"),
             std::string::npos);
   EXPECT_EQ(
@@ -238,7 +248,7 @@ TEST(SceneWriter, ResumesTheOneUnfinishedBuild) {
               std::string::npos);
     writer.keep_unfinished();
   }
-  EXPECT_EQ(unfinished_scenes(path).size(), 1U);
+  EXPECT_EQ(folder.names(), std::set<std::string>{"a.part"});
   {
     SceneWriter writer(path, Existing::kRefuse, SceneWriter::Start::kResume);
     EXPECT_EQ(test::read_text(writer.path_for("tiles/0/0/0.tin")), "done");
@@ -246,13 +256,64 @@ TEST(SceneWriter, ResumesTheOneUnfinishedBuild) {
     scene.layers = {writer.record("tiles/0/0/0.tin", "json")};
     writer.finish(scene);
   }
-  EXPECT_TRUE(unfinished_scenes(path).empty());
   EXPECT_EQ(folder.names(), std::set<std::string>{"a"});
-  SceneWriter one(folder / "b", Existing::kRefuse), two(folder / "b", Existing::kRefuse);
-  EXPECT_NE(message_of([&] {
-              SceneWriter(folder / "b", Existing::kRefuse, SceneWriter::Start::kResume);
-            }).find("2 unfinished builds"),
+}
+
+TEST(SceneWriter, TwoBuildsOfOneSceneAreOneTooMany) {
+  const TemporaryFolder folder;
+  const SceneWriter one(folder / "a", Existing::kRefuse);
+  for (const auto start :
+       {SceneWriter::Start::kAnew, SceneWriter::Start::kResume, SceneWriter::Start::kShare}) {
+    EXPECT_NE(message_of([&] {
+                SceneWriter(folder / "a", Existing::kReplace, start);
+              }).find("another process"),
+              std::string::npos);
+  }
+  const SceneWriter other(folder / "b", Existing::kRefuse);
+}
+
+TEST(SceneWriter, FinishesAloneWhatSeveralMade) {
+  const TemporaryFolder folder;
+  SceneWriter one(folder / "a", Existing::kRefuse, SceneWriter::Start::kShare);
+  {
+    SceneWriter two(folder / "a", Existing::kRefuse, SceneWriter::Start::kShare);
+    EXPECT_NE(message_of([&] { one.finish(test::small_description()); }).find("another process"),
+              std::string::npos);
+    two.keep_unfinished();
+  }
+  one.finish(test::small_description());
+  EXPECT_EQ(folder.names(), std::set<std::string>{"a"});
+}
+
+TEST(SceneWriter, UnfinishedWorkIsNotThrownAwayUnasked) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "a";
+  {
+    SceneWriter writer(path, Existing::kRefuse);
+    test::write_text(writer.path_for("work/steps/mesh.json"), "{}");
+    writer.keep_unfinished();
+  }
+  EXPECT_NE(message_of([&] { write_scene(path, Existing::kRefuse); }).find("give --resume"),
             std::string::npos);
+  EXPECT_EQ(test::read_text(path + ".part/work/steps/mesh.json"), "{}");
+  write_scene(path, Existing::kReplace);
+  EXPECT_EQ(folder.names(), std::set<std::string>{"a"});
+  EXPECT_FALSE(std::filesystem::exists(path + "/work"));
+}
+
+TEST(SceneWriter, AFinishThatWasKilledIsDoneAgain) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "a";
+  {
+    SceneWriter writer(path, Existing::kRefuse);
+    test::write_text(writer.path_for("scene.json"), scene_to_json(test::small_description()));
+    test::write_text(writer.path_for("work/steps/mesh.json"), "{}");
+    writer.keep_unfinished();
+  }
+  SceneWriter(path, Existing::kRefuse, SceneWriter::Start::kResume).finish_again();
+  EXPECT_EQ(open_scene(path).description(), test::small_description());
+  EXPECT_FALSE(std::filesystem::exists(path + "/work"));
+  EXPECT_EQ(folder.names(), std::set<std::string>{"a"});
 }
 
 TEST(SceneWriter, AReaderSeesTheOldSceneOrTheNewOne) {

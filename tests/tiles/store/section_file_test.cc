@@ -246,6 +246,46 @@ TEST(TinFile, EmptyTin) {
   EXPECT_TRUE(read_tin(SectionFile::from_memory(bytes, "f")).vertices.empty());
 }
 
+TEST(TinFile, CompactRoundTrip) {
+  Tin tin = test::grid_tin(40, 30, -12'000);
+  for (Position& p : tin.vertices) p = {p.x_m + 0x1p26, p.y_m - 0x1p25 - 0x1p-12, p.z_m};
+  std::vector<std::int64_t> samples;
+  for (std::size_t v = 0; v < tin.vertices.size(); ++v)
+    samples.push_back(v % 7 == 6 ? -1 : static_cast<std::int64_t>(v) * 1'000'003);
+  const std::vector<std::byte> bytes = compact_tin_writer(tin, samples).to_bytes();
+  EXPECT_LT(bytes.size(), tin_writer(tin, samples).to_bytes().size() / 2);
+  const SectionFile file = SectionFile::from_memory(bytes, "compact", Verify::kEverything);
+  const Tin again = read_tin(file);
+  EXPECT_EQ(again.vertices, tin.vertices);
+  EXPECT_EQ(again.triangles, tin.triangles);
+  EXPECT_EQ(again.neighbours, tin.neighbours);
+  EXPECT_EQ(read_sample_of_vertex(file), samples);
+}
+
+TEST(TinFile, CompactRefusesWhatCannotBeWalked) {
+  const auto refusal = [](Tin tin) {
+    const std::vector<std::int64_t> samples(tin.vertices.size(), 0);
+    const std::vector<std::byte> bytes = compact_tin_writer(tin, samples).to_bytes();
+    try {
+      read_tin(SectionFile::from_memory(bytes, "compact"));
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const Tin sound = test::grid_tin(3, 3);
+  EXPECT_EQ(refusal(sound), "");
+  Tin beyond = sound;
+  beyond.triangles[2][1] = 9;
+  EXPECT_NE(refusal(beyond).find("has vertex 9 of 9"), std::string::npos);
+  Tin turned = sound;
+  std::swap(turned.triangles[2][1], turned.triangles[2][2]);
+  EXPECT_NE(refusal(turned).find("counter-clockwise"), std::string::npos);
+  Tin twice = sound;
+  twice.triangles.push_back(twice.triangles[2]);
+  EXPECT_NE(refusal(twice), "");
+}
+
 TEST(TinFile, RefusesWhatCannotBeWalked) {
   const auto complains = [](const std::string& part, const std::function<void(Tin&)>& damage) {
     Tin tin = test::grid_tin(3, 3);

@@ -1,0 +1,148 @@
+#include <algorithm>
+
+#include "cli/build/step_run.h"
+#include "core/terrain/occluder.h"
+#include "core/terrain/range_pyramid.h"
+#include "ingest/mesh/tile_mesh.h"
+#include "tiles/store/range_file.h"
+#include "tiles/store/samples_file.h"
+#include "tiles/store/tin_file.h"
+
+namespace scarp {
+namespace {
+
+/// The samples of a coarse tile with its halo, put together from those that finer tiles left.
+SampleGrid window_from_finer(StepRun& run) {
+  const TileScheme& scheme = run.plan().scheme;
+  const TileWindow window = scheme.window_with_halo(run.tile());
+  SampleGrid grid;
+  grid.columns = window.columns;
+  grid.rows = window.rows;
+  const std::size_t count =
+      static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows);
+  grid.positions.resize(count);
+  grid.known.assign(count, 0);
+  grid.void_cells.assign(count, 1);
+  for (const TileId& finer : scheme.finer_around(run.tile())) {
+    const SampleGrid part = read_samples(*run.open(samples_file_name(finer)));
+    const TileWindow from = scheme.window(finer);
+    grid.cell_x_m = part.cell_x_m;
+    grid.cell_y_m = part.cell_y_m;
+    grid.bend_cells = part.bend_cells;
+    for (std::int32_t r = 0; r < part.rows; ++r) {
+      for (std::int32_t c = 0; c < part.columns; ++c) {
+        const std::int32_t column =
+            (from.first_column + c * window.stride - window.first_column) / window.stride;
+        const std::int32_t row =
+            (from.first_row + r * window.stride - window.first_row) / window.stride;
+        if (from.first_column + c * window.stride < window.first_column ||
+            from.first_row + r * window.stride < window.first_row || column >= window.columns ||
+            row >= window.rows)
+          continue;
+        const std::size_t to = grid.index(column, row), at = part.index(c, r);
+        grid.positions[to] = part.positions[at];
+        grid.known[to] = part.known[at];
+        // A cell is its own tile's: another one sees its upper left sample only.
+        if (c + 1 < part.columns && r + 1 < part.rows) grid.void_cells[to] = part.void_cells[at];
+      }
+    }
+  }
+  return grid;
+}
+
+/// Surfaces of the tiles under a coarse one and beside those: their meshes, or what hides of them.
+class FinerGround {
+ public:
+  FinerGround(StepRun& run, bool occluders) {
+    for (const TileId& id : run.plan().scheme.finer_around(run.tile())) {
+      const auto file =
+          run.open(occluders ? occluder_file_name(id) : tile_file_name(name_of(id), "tin"));
+      if (!file) continue;
+      ids_.push_back(id);
+      tins_.push_back(read_tin(*file));
+      samples_.push_back(read_sample_of_vertex(*file));
+    }
+  }
+
+  std::vector<SeenTile> tiles() const {
+    std::vector<SeenTile> tiles;
+    for (std::size_t i = 0; i < ids_.size(); ++i)
+      tiles.push_back({ids_[i], &tins_[i], samples_[i]});
+    return tiles;
+  }
+
+ private:
+  std::vector<TileId> ids_;
+  std::vector<Tin> tins_;
+  std::vector<std::vector<std::int64_t>> samples_;
+};
+
+/// How far this level lies from the finest: from the next one, and what that one has gathered.
+SurfaceGap gap_from_finest(StepRun& run, const SeenTile& coarse, const FinerGround& finer) {
+  const TileScheme& scheme = run.plan().scheme;
+  SurfaceGap gathered;
+  if (coarse.id.level + 1 < scheme.finest_level()) {
+    for (const TileId& child : scheme.children(coarse.id)) {
+      const nlohmann::json facts = run.facts_of(StepKind::kLevel, child);
+      if (!facts.contains("above_m")) continue;
+      gathered.above_m = std::max(gathered.above_m, facts["above_m"].get<double>());
+      gathered.below_m = std::max(gathered.below_m, facts["below_m"].get<double>());
+    }
+  }
+  const SurfaceGap gap = gap_of(scheme, coarse, finer.tiles());
+  return {gap.above_m + gathered.above_m, gap.below_m + gathered.below_m};
+}
+
+}  // namespace
+
+void level_of_tile(StepRun& run) {
+  const BuildPlan& plan = run.plan();
+  const TileId tile = run.tile();
+  run.part("levels", [&](const Progress& progress) {
+    const SampleGrid grid = window_from_finer(run);
+    Mesh mesh = mesh_tile(plan.scheme, tile, grid, {.max_error_m = plan.max_error_m_of(tile.level)},
+                          progress);
+    if (tile.level > 0) hand_on_samples(run, grid);
+    if (mesh.tin.triangles.empty()) return;
+    run.facts = facts_of_mesh(mesh);
+    run.make(tile_file_name(name_of(tile), "tin"), "tin", [&](const std::string& path) {
+      write_compact_tin(path, mesh.tin, mesh.sample_of_vertex, Existing::kReplace);
+    });
+    const SeenTile coarse{tile, &mesh.tin, mesh.sample_of_vertex};
+    FinerGround finer(run, false);
+    const SurfaceGap gap = gap_from_finest(run, coarse, finer);
+    run.facts["above_m"] = gap.above_m;
+    run.facts["below_m"] = gap.below_m;
+    if (tile.level + 1 < plan.scheme.finest_level()) finer = FinerGround(run, true);
+    const Occluder occluder = occluder_of(plan.scheme, coarse, finer.tiles());
+    if (occluder.tin.triangles.empty()) return;
+    run.make(occluder_file_name(tile), "occluder", [&](const std::string& path) {
+      write_tin(path, occluder.tin, occluder.sample_of_vertex, Existing::kReplace);
+    });
+  });
+}
+
+void ranges_of_scene(StepRun& run) {
+  const TileScheme& scheme = run.plan().scheme;
+  run.part("ranges", [&](const Progress&) {
+    std::vector<TileRanges> finer;
+    for (const TileId& tile : scheme.tiles(scheme.finest_level())) {
+      finer.push_back(read_ranges(*run.open(tile_file_name(name_of(tile), "range"))));
+    }
+    for (std::int32_t level = scheme.finest_level() - 1; level >= 0; --level) {
+      std::vector<TileRanges> coarser;
+      for (const TileId& tile : scheme.tiles(level)) {
+        std::vector<QuarterRanges> quarters;
+        for (const TileId& child : scheme.children(tile))
+          quarters.push_back({child, &finer[scheme.number_of(child)]});
+        coarser.push_back(joined(scheme, tile, quarters));
+        run.make(tile_file_name(name_of(tile), "range"), "range", [&](const std::string& path) {
+          write_ranges(path, coarser.back(), Existing::kReplace);
+        });
+      }
+      finer = std::move(coarser);
+    }
+  });
+}
+
+}  // namespace scarp

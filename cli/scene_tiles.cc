@@ -1,0 +1,116 @@
+#include "cli/scene_tiles.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/terrain/weld.h"
+#include "tiles/store/groups_file.h"
+#include "tiles/store/tin_file.h"
+
+namespace scarp {
+namespace {
+
+/// Allowance for rounding, and for how far a normal leans over kilometres of height: metres.
+constexpr double kBesideM = 10;
+
+/// Whether a rectangle lies wholly in the half-plane to the right of a direction from the eye.
+bool is_right_of(const TileContents& contents, const Position& eye, double direction_rad) {
+  const double dx = std::cos(direction_rad), dy = std::sin(direction_rad);
+  for (const double x : {contents.low[0] - kBesideM, contents.high[0] + kBesideM})
+    for (const double y : {contents.low[1] - kBesideM, contents.high[1] + kBesideM})
+      if (dx * (y - eye.y_m) - dy * (x - eye.x_m) >= 0) return false;
+  return true;
+}
+
+/// Whether no place of a rectangle is in a view of less than half a turn: then it lies to the right
+/// of its first direction, or to the left of its last.
+bool is_beside(const TileContents& contents, const Position& eye, const ViewRange& view) {
+  if (view.to_rad - view.from_rad >= M_PI) return false;
+  return is_right_of(contents, eye, view.from_rad) ||
+         is_right_of(contents, eye, view.to_rad + M_PI) ||
+         // or behind the eye: to the right of the direction square to the left of the middle one
+         is_right_of(contents, eye, (view.from_rad + view.to_rad) / 2 - M_PI / 2);
+}
+
+}  // namespace
+
+SceneTiles::SceneTiles(const std::string& path)
+    : scene_(open_scene(path)), frame_(frame_of(scene_.description())) {
+  GroupIndex groups = 0;
+  for (const std::size_t i : finest_tiles(scene_.description())) {
+    const SceneTile& tile = scene_.description().tiles[i];
+    if (scene_.find(tile.id, "tin") == nullptr) continue;  // void
+    tiles_.push_back(i);
+    first_group_.push_back(groups);
+    if (tile.contents) groups += static_cast<GroupIndex>(tile.contents->groups);
+  }
+}
+
+bool SceneTiles::meets(std::size_t i, const ViewPlan& plan) const {
+  if (!tile(i).contents) return true;
+  const TileContents& contents = *tile(i).contents;
+  const double dx =
+      std::max({contents.low[0] - plan.eye.x_m, plan.eye.x_m - contents.high[0], 0.0});
+  const double dy =
+      std::max({contents.low[1] - plan.eye.y_m, plan.eye.y_m - contents.high[1], 0.0});
+  if (std::hypot(dx, dy) > plan.radius_m + kBesideM) return false;
+  return !plan.view || !is_beside(contents, plan.eye, *plan.view);
+}
+
+Tin SceneTiles::read_tin(std::size_t i) {
+  read_.insert(i);
+  return scarp::read_tin(scene_.open(scene_.require(tile(i).id, "tin")));
+}
+
+Groups SceneTiles::read_groups(std::size_t i) {
+  read_.insert(i);
+  return scarp::read_groups(scene_.open(scene_.require(tile(i).id, "groups")));
+}
+
+std::vector<std::size_t> SceneTiles::tiles_in(const ViewPlan& plan) const {
+  std::vector<std::size_t> tiles;
+  for (std::size_t i = 0; i < size(); ++i)
+    if (meets(i, plan)) tiles.push_back(i);
+  return tiles;
+}
+
+Tin SceneTiles::read_ground(const std::vector<std::size_t>& tiles) {
+  std::vector<Tin> tins;
+  for (const std::size_t i : tiles) tins.push_back(read_tin(i));
+  if (tins.size() == 1) return std::move(tins.front());
+  std::vector<const Tin*> parts;
+  for (const Tin& tin : tins) parts.push_back(&tin);
+  return weld(parts).tin;
+}
+
+TileWindow SceneTiles::window_of(const std::vector<std::size_t>& tiles) const {
+  const RasterGeometry& raster = scene_.description().raster;
+  const auto& parameters = scene_.description().parameters;
+  const auto side = parameters.find("tile_samples");
+  if (side == parameters.end() || tiles.size() == size() || tiles.empty())
+    return {0, 0, raster.columns, raster.rows, 1};
+  const TileScheme scheme(raster.columns, raster.rows,
+                          static_cast<std::int32_t>(std::get<std::int64_t>(side->second)));
+  std::int32_t left = raster.columns, above = raster.rows, right = 0, below = 0;
+  for (const std::size_t i : tiles) {
+    const TileWindow window = scheme.window(tile_id(tile(i)));
+    left = std::min(left, window.first_column);
+    above = std::min(above, window.first_row);
+    right = std::max(right, window.last_column());
+    below = std::max(below, window.last_row());
+  }
+  return {left, above, right - left + 1, below - above + 1, 1};
+}
+
+MapPoint SceneTiles::resolve(const TypedPosition& typed, const std::string& crs) {
+  if (typed.above_datum) return to_map_point(typed, crs, frame_);
+  const GeoFrame::Placer placer(frame_);
+  MapPoint point = to_map_point(typed, crs, frame_);
+  point.height_m = 0;
+  // The place in the plane depends a little on the height: see ground_height_m.
+  constexpr double kLeanM = 100;
+  const Tin ground = read_ground(tiles_in({placer.place(point), kLeanM, {}}));
+  return scarp::resolve(typed, crs, frame_, TinIndex(ground));
+}
+
+}  // namespace scarp

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "cli/loaded_scene.h"
+#include "core/culling/camera.h"
+
+namespace scarp {
+
+/// A disc in the plane around an eye, or a part of it.
+struct ViewPlan {
+  Position eye;
+  double radius_m = HUGE_VAL;
+  std::optional<ViewRange> view;  ///< none: all around
+};
+
+/// The finest tiles of a scene, opened when they are asked for. Reads scene.json only, until then.
+class SceneTiles {
+ public:
+  /// Throws as open_scene.
+  explicit SceneTiles(const std::string& path);
+
+  const Scene& scene() const { return scene_; }
+  const GeoFrame& frame() const { return frame_; }
+
+  /// How many have a mesh, by rising row, then column.
+  std::size_t size() const { return tiles_.size(); }
+  const SceneTile& tile(std::size_t i) const { return scene_.description().tiles[tiles_[i]]; }
+  /// The number in the scene of a tile's group 0. Requires that all tiles before it tell their
+  /// contents, or that there is one tile.
+  GroupIndex first_group(std::size_t i) const { return first_group_[i]; }
+
+  /// Whether a tile may have ground in a part of the plane; true where it does not tell its bounds.
+  /// Side: never false where it has.
+  bool meets(std::size_t i, const ViewPlan& plan) const;
+
+  /// The mesh of a tile.
+  Tin read_tin(std::size_t i);
+  /// Its groups.
+  Groups read_groups(std::size_t i);
+  /// The tiles that meet a plan.
+  std::vector<std::size_t> tiles_in(const ViewPlan& plan) const;
+  /// Tiles as one surface.
+  Tin read_ground(const std::vector<std::size_t>& tiles);
+  /// The rectangle of the raster that holds the samples of tiles; all of it where the scene does
+  /// not tell how large tiles are.
+  TileWindow window_of(const std::vector<std::size_t>& tiles) const;
+
+  /// How many different ones were read so far.
+  std::size_t tiles_read() const { return read_.size(); }
+
+  /// As resolve of a whole scene, by the mesh of the tiles at the place.
+  MapPoint resolve(const TypedPosition& typed, const std::string& crs);
+
+ private:
+  Scene scene_;
+  GeoFrame frame_;
+  std::vector<std::size_t> tiles_;  // into the description
+  std::vector<GroupIndex> first_group_;
+  std::set<std::size_t> read_;
+};
+
+}  // namespace scarp

@@ -1,0 +1,412 @@
+#include <gdal_priv.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <thread>
+
+#include "tests/support/fractal_ground.h"
+#include "tests/support/run_scarp.h"
+#include "tests/support/temp_folder.h"
+#include "tiles/store/checksum.h"
+
+namespace scarp {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using test::run_scarp;
+using test::RunResult;
+
+json read_json(const std::string& path) {
+  return json::parse(std::ifstream(path));
+}
+
+/// Mountains with a lake of void, 30 m, of a size that no tile divides.
+constexpr int kColumns = 201, kRows = 165;
+std::string write_dem(const std::string& path) {
+  GDALAllRegister();
+  GDALDataset* dataset = GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
+      path.c_str(), kColumns, kRows, 1, GDT_Int16, nullptr);
+  double transform[6] = {400'000, 30, 0, 5'200'000, 0, -30};
+  dataset->SetGeoTransform(transform);
+  OGRSpatialReference crs;
+  crs.SetFromUserInput("EPSG:32632");
+  dataset->SetSpatialRef(&crs);
+  dataset->GetRasterBand(1)->SetNoDataValue(-1);
+  const test::FractalGround ground(3);
+  for (int row = 0; row < kRows; ++row) {
+    std::vector<std::int16_t> heights(kColumns);
+    ground.row(700, 900 + row, heights);
+    for (int column = 0; column < kColumns; ++column)
+      if ((column - 100) * (column - 100) + (row - 90) * (row - 90) < 200)
+        heights[static_cast<std::size_t>(column)] = -1;
+    EXPECT_EQ(dataset->GetRasterBand(1)->RasterIO(GF_Write, 0, row, kColumns, 1, heights.data(),
+                                                  kColumns, 1, GDT_Int16, 0, 0),
+              CE_None);
+  }
+  GDALClose(dataset);
+  return path;
+}
+
+/// Size and checksum of every file of a scene, but those that hold times.
+std::map<std::string, std::string> files_of(const std::string& scene) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(scene)) {
+    const std::string name = entry.path().lexically_relative(scene).generic_string();
+    if (entry.is_regular_file() && name != "report.json" && name != "scene.json")
+      files[name] = to_hex(digest_of_file(entry.path().string()).checksum);
+  }
+  return files;
+}
+
+constexpr char kQuick[] =
+    " --max-error 6 --fans 32 --patch 2 --group-triangles 40 --min-group-triangles 10 "
+    "--tile-samples 64 ";
+
+/// One DEM and one scene of 4 x 3 tiles for all tests that only read it.
+class TiledBuild : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new test::TempFolder;
+    dem_ = write_dem(folder_->path("dem.tif"));
+    scene_ = folder_->path("tiled.scene");
+    built_ = run_scarp("$SCARP build " + dem_ + " -o " + scene_ + kQuick + "--json");
+  }
+  static void TearDownTestSuite() { delete folder_; }
+  void SetUp() override { ASSERT_EQ(built_.exit_code, 0) << built_.errors; }
+
+  static std::string build(const std::string& scene) {
+    return "$SCARP build " + dem_ + " -o " + scene + kQuick;
+  }
+
+  static inline test::TempFolder* folder_ = nullptr;
+  static inline std::string dem_, scene_;
+  static inline RunResult built_;
+};
+
+TEST_F(TiledBuild, ReportTellsTilesLevelsAndWhatRefinementSaved) {
+  const json report = json::parse(built_.output);
+  EXPECT_EQ(report["tiles"]["finest"], 12);
+  EXPECT_EQ(report["tiles"]["levels"], 3);
+  EXPECT_EQ(report["raster"]["known_samples"], report["inputs"][0]["samples"]);
+  EXPECT_LE(report["mesh"]["error_over_surface_m"], 6);
+  ASSERT_EQ(report["levels"].size(), 2U);
+  for (const json& level : report["levels"]) {
+    EXPECT_GT(level["triangles"], 0);
+    EXPECT_GT(level["above_finest_m"], 0);
+  }
+  EXPECT_GT(report["refinement"]["saved_of_mesh"], 0.5);
+  EXPECT_GT(report["refinement"]["saved_of_seen_ground"], 0);
+  EXPECT_GT(report["bytes_read"], 0);
+  EXPECT_GT(report["bytes_written"], 0);
+  EXPECT_GT(report["peak_memory_bytes"], 1 << 20);
+  const json scene = read_json(scene_ + "/scene.json");
+  EXPECT_EQ(scene["tiles"].size(), 12U + 4 + 1);
+  EXPECT_FALSE(fs::exists(scene_ + "/work"));
+}
+
+TEST_F(TiledBuild, CullsNothingThatIsSeen) {
+  const RunResult run =
+      run_scarp("$SCARP verify " + scene_ + " --eyes 3 --heights 2 --seed 5 --json");
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  for (const json& row : json::parse(run.output)) {
+    EXPECT_EQ(row["falsely_culled"], 0);
+    EXPECT_GT(row["culled"], 0);
+    EXPECT_GT(row["hidden"], row["culled"]);
+  }
+}
+
+TEST_F(TiledBuild, GroupsLayerIsTheGroupsOfTheScene) {
+  GDALDataset* groups = GDALDataset::Open((scene_ + "/layers/groups.tif").c_str());
+  ASSERT_NE(groups, nullptr);
+  EXPECT_STREQ(groups->GetMetadataItem("LAYOUT", "IMAGE_STRUCTURE"), "COG");
+  std::vector<std::int32_t> values(static_cast<std::size_t>(kColumns) * kRows);
+  ASSERT_EQ(groups->GetRasterBand(1)->RasterIO(GF_Read, 0, 0, kColumns, kRows, values.data(),
+                                               kColumns, kRows, GDT_Int32, 0, 0),
+            CE_None);
+  GDALClose(groups);
+  const json report = read_json(scene_ + "/report.json");
+  std::map<std::int32_t, int> samples_of;
+  for (const std::int32_t value : values) ++samples_of[value];
+  EXPECT_EQ(samples_of[-9999], kColumns * kRows - report["raster"]["known_samples"].get<int>() +
+                                   report["mesh"]["lost_samples"].get<int>());
+  EXPECT_GT(samples_of.rbegin()->first, report["groups"]["groups"].get<std::int32_t>() * 9 / 10);
+  EXPECT_LT(samples_of.rbegin()->first, report["groups"]["groups"].get<std::int32_t>());
+}
+
+TEST_F(TiledBuild, SameBitsForAnyThreadCountAndMemory) {
+  const std::string other = folder_->path("other.scene");
+  for (const char* how : {"--threads 1 --memory 250M", "--threads 5 --memory 3GiB"}) {
+    ASSERT_EQ(run_scarp(build(other) + how + " --overwrite").exit_code, 0) << how;
+    EXPECT_EQ(files_of(other), files_of(scene_)) << how;
+  }
+}
+
+TEST_F(TiledBuild, CullReadsTheTilesThatItNeeds) {
+  const std::string ask = "$SCARP cull " + scene_ + " --camera=401900,5198200,40 --json";
+  const json all = json::parse(run_scarp(ask).output);
+  EXPECT_EQ(all["tiles"], 12);
+  EXPECT_EQ(all["tiles_read"], 12);
+  const json near = json::parse(run_scarp(ask + " --max-distance 500").output);
+  EXPECT_LE(near["tiles_read"], 4);
+  const json east = json::parse(run_scarp(ask + " --azimuth 90 --field-of-view 60").output);
+  EXPECT_LT(east["tiles_read"], 12);
+  const auto groups = all["visible_groups"].get<std::set<int>>();
+  for (const json* part : {&near, &east}) {
+    EXPECT_GT((*part)["visible_groups"].size(), 0U);
+    EXPECT_LT((*part)["visible_groups"].size(), groups.size());
+    for (const int group : (*part)["visible_groups"]) EXPECT_TRUE(groups.contains(group));
+  }
+}
+
+/// Values of a raster by the map place of its samples.
+std::map<std::pair<long, long>, int> values_by_place(const std::string& path) {
+  GDALDataset* raster = GDALDataset::Open(path.c_str());
+  const int columns = raster->GetRasterXSize(), rows = raster->GetRasterYSize();
+  double transform[6];
+  raster->GetGeoTransform(transform);
+  std::vector<std::uint8_t> values(static_cast<std::size_t>(columns) *
+                                   static_cast<std::size_t>(rows));
+  EXPECT_EQ(raster->GetRasterBand(1)->RasterIO(GF_Read, 0, 0, columns, rows, values.data(), columns,
+                                               rows, GDT_Byte, 0, 0),
+            CE_None);
+  GDALClose(raster);
+  std::map<std::pair<long, long>, int> by_place;
+  for (int r = 0; r < rows; ++r)
+    for (int c = 0; c < columns; ++c)
+      by_place[{std::lround(transform[0] + (c + 0.5) * transform[1]),
+                std::lround(transform[3] + (r + 0.5) * transform[5])}] =
+          values[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns) +
+                 static_cast<std::size_t>(c)];
+  return by_place;
+}
+
+TEST_F(TiledBuild, ViewshedReadsTheTilesThatItReaches) {
+  const std::string ask = "$SCARP viewshed " + scene_ + " --observer=401900,5198200,40 --json";
+  const std::string near_file = folder_->path("near.tif"), all_file = folder_->path("all.tif");
+  const RunResult near_run = run_scarp(ask + " --max-distance 600 -o " + near_file);
+  ASSERT_EQ(near_run.exit_code, 0) << near_run.errors;
+  const json near = json::parse(near_run.output);
+  const json all = json::parse(run_scarp(ask + " -o " + all_file).output);
+  EXPECT_EQ(all["tiles_read"], 12);
+  EXPECT_LE(near["tiles_read"], 4);
+  EXPECT_LT(near["columns"], kColumns);
+  const auto whole = values_by_place(all_file);
+  int visible = 0;
+  for (const auto& [place, value] : values_by_place(near_file)) {
+    const double dx = static_cast<double>(place.first - 401'900);
+    const double dy = static_cast<double>(place.second - 5'198'200);
+    if (std::hypot(dx, dy) > 590) continue;  // beyond the distance nothing is seen
+    EXPECT_EQ(value, whole.at(place)) << place.first << " " << place.second;
+    visible += value;
+  }
+  EXPECT_GT(visible, 100);
+}
+
+TEST_F(TiledBuild, StepsOfAPlanMakeTheSameSceneInAnyOrderThatItAllows) {
+  const std::string plan = folder_->path("plan.json"), scene = folder_->path("planned.scene");
+  ASSERT_EQ(run_scarp(build(scene) + "--plan " + plan).exit_code, 0);
+  EXPECT_FALSE(fs::exists(scene + ".part"));
+  const json steps = read_json(plan)["steps"];
+  const auto step = [&](std::size_t i) {
+    return run_scarp("$SCARP build --plan " + plan + " --step " + std::to_string(i));
+  };
+  const RunResult early = step(steps.size() - 1);
+  EXPECT_EQ(early.exit_code, 2);
+  EXPECT_NE(early.errors.find("done before"), std::string::npos) << early.errors;
+  // Always the last step that may be done.
+  std::set<std::size_t> done;
+  while (done.size() < steps.size()) {
+    std::size_t next = steps.size();
+    while (next-- > 0) {
+      if (done.contains(next)) continue;
+      const auto after = steps[next]["after"].get<std::vector<std::size_t>>();
+      if (std::all_of(after.begin(), after.end(), [&](std::size_t b) { return done.contains(b); }))
+        break;
+    }
+    const RunResult run = step(next);
+    ASSERT_EQ(run.exit_code, 0) << run.errors;
+    if (done.size() % 7 == 0) {
+      const RunResult again = step(next);
+      EXPECT_EQ(again.exit_code, 0) << again.errors;
+      EXPECT_NE(again.output.find("was done already"), std::string::npos) << again.output;
+    }
+    done.insert(next);
+  }
+  EXPECT_EQ(files_of(scene), files_of(scene_));
+  EXPECT_EQ(step(3).exit_code, 0);
+  EXPECT_FALSE(fs::exists(scene + ".part"));
+}
+
+/// Starts a build and kills it after a while. @return whether it was killed
+bool build_and_kill(const std::string& command, std::chrono::milliseconds after) {
+  const pid_t child = fork();
+  if (child == 0) {
+    const std::string exec = "SCARP='" SCARP_PROGRAM "'; exec " + command + " >/dev/null 2>&1";
+    execl("/bin/sh", "sh", "-c", exec.c_str(), nullptr);
+    _exit(127);
+  }
+  std::this_thread::sleep_for(after);
+  kill(child, SIGKILL);
+  int status = 0;
+  waitpid(child, &status, 0);
+  return WIFSIGNALED(status);
+}
+
+std::map<std::string, fs::file_time_type> records_in(const std::string& folder) {
+  std::map<std::string, fs::file_time_type> records;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(folder, none))
+    if (entry.path().extension() == ".json")
+      records[entry.path().filename().string()] = fs::last_write_time(entry.path(), none);
+  return records;
+}
+
+TEST_F(TiledBuild, KilledAndResumedItMakesTheSameSceneAndRepeatsNothing) {
+  // SCARP_PROVE_KILLS=50 is the long form.
+  const char* asked = std::getenv("SCARP_PROVE_KILLS");
+  const int kills = asked ? std::atoi(asked) : 4;
+  const std::string scene = folder_->path("killed.scene");
+  const auto begun = std::chrono::steady_clock::now();
+  ASSERT_EQ(run_scarp(build(scene)).exit_code, 0);
+  const auto whole = std::chrono::duration_cast<std::chrono::milliseconds>(
+      std::chrono::steady_clock::now() - begun);
+  fs::remove_all(scene);
+  std::uint64_t random = 1;
+  int killed = 0;
+  while (killed < kills) {
+    random = random * 6364136223846793005U + 1442695040888963407U;
+    const auto after = whole * static_cast<int>((random >> 33) % 1000) / 1000 / (asked ? 1 : 2);
+    const auto before = records_in(scene + ".part/work/steps");
+    if (build_and_kill(build(scene) + "--resume", after)) {
+      ++killed;
+      for (const auto& [record, time] : records_in(scene + ".part/work/steps"))
+        if (before.contains(record)) {
+          EXPECT_EQ(before.at(record), time) << record;
+        }
+      if (fs::exists(scene + "/scene.json")) {
+        EXPECT_EQ(files_of(scene), files_of(scene_));
+        fs::remove_all(scene);
+      }
+    } else {
+      EXPECT_EQ(files_of(scene), files_of(scene_));
+      fs::remove_all(scene);
+    }
+  }
+  const RunResult last = run_scarp(build(scene) + "--resume");
+  EXPECT_EQ(last.exit_code, 0) << last.errors;
+  EXPECT_EQ(files_of(scene), files_of(scene_));
+  EXPECT_EQ(run_scarp("$SCARP check " + scene).exit_code, 0);
+  EXPECT_FALSE(fs::exists(scene + ".part"));
+  fs::remove_all(scene);
+}
+
+TEST_F(TiledBuild, AFullDiskIsOneLineAndWhatWasFinishedIsGoneOnWith) {
+  const std::string scene = folder_->path("full.scene");
+  // Tiles fit under the limit, the pictures do not.
+  const RunResult full = run_scarp("trap '' XFSZ; ulimit -f 700; " + build(scene));
+  EXPECT_EQ(full.exit_code, 1);
+  EXPECT_EQ(std::count(full.errors.begin(), full.errors.end(), '\n'), 1) << full.errors;
+  EXPECT_NE(full.errors.find("--resume"), std::string::npos) << full.errors;
+  EXPECT_FALSE(fs::exists(scene));
+  const RunResult anew = run_scarp(build(scene));
+  EXPECT_EQ(anew.exit_code, 1);
+  EXPECT_NE(anew.errors.find("unfinished build"), std::string::npos) << anew.errors;
+  const RunResult otherwise = run_scarp(build(scene) + "--resume --seed 2");
+  EXPECT_EQ(otherwise.exit_code, 1);
+  EXPECT_NE(otherwise.errors.find("other options"), std::string::npos) << otherwise.errors;
+  const auto before = records_in(scene + ".part/work/steps");
+  EXPECT_EQ(before.size(), 31U);  // all but the last
+  ASSERT_EQ(run_scarp(build(scene) + "--resume").exit_code, 0);
+  EXPECT_EQ(files_of(scene), files_of(scene_));
+  EXPECT_EQ(run_scarp(build(scene) + "--resume").exit_code, 0);  // nothing left to do
+}
+
+TEST_F(TiledBuild, ASourceThatGoesOrChangesMidwayIsNamed) {
+  const std::string dem = folder_->path("going.tif"), scene = folder_->path("going.scene");
+  const std::string plan = folder_->path("going.json");
+  fs::copy_file(dem_, dem);
+  const std::string build = "$SCARP build " + dem + " -o " + scene + kQuick;
+  ASSERT_EQ(run_scarp(build + "--plan " + plan).exit_code, 0);
+  const auto step = [&](int i) {
+    return run_scarp("$SCARP build --plan " + plan + " --step " + std::to_string(i));
+  };
+  ASSERT_EQ(step(0).exit_code, 0);
+  ASSERT_EQ(step(1).exit_code, 0);
+  fs::rename(dem, dem + ".away");
+  const RunResult gone = step(2);
+  EXPECT_EQ(gone.exit_code, 1);
+  EXPECT_NE(gone.errors.find("no such file"), std::string::npos) << gone.errors;
+  fs::copy_file(dem_, dem);  // the same bytes, but who knows
+  const RunResult changed = step(2);
+  EXPECT_EQ(changed.exit_code, 1);
+  EXPECT_NE(changed.errors.find("other sources"), std::string::npos) << changed.errors;
+  fs::remove(dem);
+  fs::rename(dem + ".away", dem);
+  EXPECT_EQ(step(1).output.find("was done already") != std::string::npos, true);
+  EXPECT_EQ(step(2).exit_code, 0);
+  ASSERT_EQ(run_scarp(build + "--resume").exit_code, 0);
+  EXPECT_EQ(files_of(scene), files_of(scene_));
+}
+
+TEST_F(TiledBuild, TwoBuildsOfOneSceneAreOneTooMany) {
+  const std::string scene = folder_->path("twice.scene");
+  fs::create_directory(scene + ".part");
+  // Holds the folder's lock as a running build does.
+  const RunResult second = run_scarp("flock '" + scene + ".part' -c \"" SCARP_PROGRAM " build " +
+                                     dem_ + " -o " + scene + kQuick + "\"");
+  EXPECT_EQ(second.exit_code, 1);
+  EXPECT_NE(second.errors.find("another process is building"), std::string::npos) << second.errors;
+  EXPECT_EQ(std::count(second.errors.begin(), second.errors.end(), '\n'), 1);
+}
+
+TEST_F(TiledBuild, CheckFindsAFlippedBitInAnyFile) {
+  for (const auto& [name, checksum] : files_of(scene_)) {
+    const std::string path = scene_ + "/" + name;
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    const auto at = static_cast<std::streamoff>(fs::file_size(path) * 3 / 5);
+    file.seekg(at);
+    const auto byte = static_cast<char>(file.get());
+    const auto write = [&](char value) {
+      file.seekp(at);
+      file.put(value);
+      file.flush();
+    };
+    write(static_cast<char>(byte ^ 4));
+    const RunResult run = run_scarp("$SCARP check " + scene_);
+    EXPECT_EQ(run.exit_code, 1) << name;
+    EXPECT_NE(run.output.find(name), std::string::npos) << name << "\n" << run.output;
+    write(byte);
+  }
+  EXPECT_EQ(run_scarp("$SCARP check " + scene_).exit_code, 0);
+}
+
+TEST_F(TiledBuild, MemoryThatIsTooSmallIsSaidBeforeTheWork) {
+  const std::string scene = folder_->path("small.scene"), large = folder_->path("large.vrt");
+  std::ofstream(large) << "<VRTDataset rasterXSize='20000' rasterYSize='20000'>"
+                          "<GeoTransform>4e5, 30, 0, 52e5, 0, -30</GeoTransform>"
+                          "<VRTRasterBand dataType='Int16' band='1'/></VRTDataset>";
+  const std::string build = "$SCARP build " + large + " -o " + scene + " --memory 600M ";
+  const RunResult run = run_scarp(build + "--tile-samples 4096");
+  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_NE(run.errors.find("give --tile-samples 256"), std::string::npos) << run.errors;
+  const RunResult whole = run_scarp(build + "--vertices 500");
+  EXPECT_EQ(whole.exit_code, 1);
+  EXPECT_NE(whole.errors.find("--vertices, which takes them in one piece"), std::string::npos)
+      << whole.errors;
+  const RunResult viewshed = run_scarp(build + "--tile-samples 256 --observer 4e5,52e5");
+  EXPECT_EQ(viewshed.exit_code, 2);
+  EXPECT_NE(viewshed.errors.find("--observer"), std::string::npos) << viewshed.errors;
+  EXPECT_FALSE(fs::exists(scene + ".part"));
+}
+
+}  // namespace
+}  // namespace scarp
