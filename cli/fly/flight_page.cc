@@ -11,8 +11,9 @@
 namespace scarp {
 namespace {
 
-constexpr const char* kColours[] = {"#2b2f36", "#1f77b4", "#d6502b", "#2a9d5c", "#9457b8",
-                                    "#c49a00", "#17a2b8", "#8c564b", "#e377c2", "#7f7f7f"};
+constexpr const char* kColours[] = {"#1f77b4", "#d6502b", "#2a9d5c", "#9457b8",
+                                    "#c49a00", "#17a2b8", "#8c564b", "#e377c2",
+                                    "#7f8c1f", "#5060d0", "#b02050", "#00705a"};
 
 struct Line {
   std::string name;
@@ -73,7 +74,7 @@ std::string line_chart(const std::string& title, const std::vector<Line>& lines)
 }
 
 const char* colour_of(std::size_t contender) {
-  return kColours[(contender + 1) % std::size(kColours)];
+  return kColours[contender % std::size(kColours)];
 }
 
 /// A chart with a line a contender.
