@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -11,6 +10,7 @@
 #include "cli/build/layers.h"
 #include "cli/commands.h"
 #include "cli/loaded_scene.h"
+#include "cli/outputs.h"
 #include "cli/stages.h"
 #include "core/error/error.h"
 #include "core/geodesy/sun.h"
@@ -72,12 +72,7 @@ void check_options(const HorizonOptions& options) {
     throw Error(
         ErrorCode::kUsage,
         fmt::format("'{}': is asked for twice; each output needs a name of its own", *twice));
-  for (const std::string& path : outputs)
-    if (!options.common.overwrite && std::filesystem::exists(path))
-      throw Error(ErrorCode::kInput,
-                  fmt::format("'{}': exists; a new file was expected; give --overwrite to replace "
-                              "it",
-                              path));
+  for (const std::string& path : outputs) check_new_file(path, options.common);
 }
 
 /// TIFF counts bands in 16 bits.
@@ -165,9 +160,10 @@ class AllHorizonsRun {
 
   /// What grows on the disk. Missing folders and too little room show here.
   void open_outputs() {
-    if (!options_.output.empty()) horizons_.emplace(options_.output, horizon_layer(), existing());
+    if (!options_.output.empty())
+      horizons_.emplace(options_.output, horizon_layer(), existing(options_.common));
     if (!options_.distance_output.empty())
-      distances_.emplace(options_.distance_output, distance_layer(), existing());
+      distances_.emplace(options_.distance_output, distance_layer(), existing(options_.common));
   }
 
   void look(const Progress& progress) {
@@ -253,10 +249,6 @@ class AllHorizonsRun {
   void shade() {
     light_.resize(samples_);
     judged_ = cast_shadow(ground_.grid, earth_, sun_direction(*options_.sun_days), light_);
-  }
-
-  Existing existing() const {
-    return options_.common.overwrite ? Existing::kReplace : Existing::kRefuse;
   }
 
   RasterLayer horizon_layer() const {
@@ -346,18 +338,13 @@ class AllHorizonsRun {
   /// With what the run was, for whoever opens the raster.
   void write_layer(const std::string& path, RasterLayer& layer) const {
     add_metadata(layer);
-    write_geotiff_cog(path, layer, existing());
+    write_geotiff_cog(path, layer, existing(options_.common));
   }
 
   void add_metadata(RasterLayer& layer) const {
     const FrameDescription& frame = ground_.dem.frame->description();
     std::map<std::string, std::string>& metadata = layer.metadata;
-    metadata["SURFACE"] = "grid";
-    metadata["EARTH"] = frame.earth == Earth::kFlat ? "flat" : "ellipsoid";
-    metadata["REFRACTION"] = fmt::format("{:g}", frame.refraction);
-    metadata["HEIGHTS"] = frame.earth == Earth::kFlat ? "above the map plane"
-                          : frame.geoid_file.empty()  ? "taken as ellipsoidal"
-                                                      : "geoid added";
+    write_note(note_of("grid", frame), metadata);
     metadata["HEIGHT_UNIT_OF_DEM"] = ground_.dem.height_unit;
     if (!options_.sun_days) {
       metadata["AZIMUTHS"] = fmt::format("{} from {} north clockwise", azimuths_,
@@ -388,9 +375,7 @@ class AllHorizonsRun {
           std::pair("openness", options_.openness_output),
           std::pair("negative_openness", options_.negative_openness_output)})
       if (!path.empty()) result[name] = path;
-    for (const StageCost& cost : stages_.costs())
-      result["stages"].push_back(
-          {{"name", cost.name}, {"seconds", cost.seconds}, {"peak_bytes", cost.peak_bytes}});
+    result["stages"] = stages_json(stages_);
     return result;
   }
 

@@ -7,6 +7,7 @@
 
 #include "cli/build/run_plan.h"
 #include "cli/commands.h"
+#include "cli/outputs.h"
 #include "cli/progress_bar.h"
 #include "core/error/error.h"
 #include "tiles/store/scene.h"
@@ -145,8 +146,7 @@ void build_all(const BuildPlan& plan, ProgressBar& bar) {
 int write_plan(const BuildOptions& options) {
   const BuildPlan plan = make_plan(options);
   const std::string text = to_json(plan).dump(2) + "\n";
-  write_file(options.plan_file, std::as_bytes(std::span(text)),
-             options.common.overwrite ? Existing::kReplace : Existing::kRefuse);
+  write_file(options.plan_file, std::as_bytes(std::span(text)), existing(options.common));
   if (options.common.json)
     fmt::print("{}", text);
   else

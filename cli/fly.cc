@@ -12,6 +12,7 @@
 #include "cli/fly/flight_path.h"
 #include "cli/fly/frame_picture.h"
 #include "cli/loaded_scene.h"
+#include "cli/outputs.h"
 #include "cli/progress_bar.h"
 #include "cli/scene_culling.h"
 #include "core/culling/box_tree.h"
@@ -174,8 +175,7 @@ void print_table(const Flight& flight, const std::vector<Contender>& contenders)
 
 int run_fly(const FlyOptions& options) {
   const LoadedScene scene(options.scene);
-  PartFolder folder(options.output, kPageName,
-                    options.common.overwrite ? Existing::kReplace : Existing::kRefuse);
+  PartFolder folder(options.output, kPageName, existing(options.common));
   const std::vector<Waypoint> path =
       options.path_file.empty()
           ? find_path(scene, route_of(options.route), options.frames, options.seed)

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "cli/outputs.h"
 #include "core/error/error.h"
 
 namespace scarp {
@@ -98,8 +99,7 @@ const StoredFile* StepRecord::output(const std::string& name) const {
 
 Workspace::Workspace(const BuildPlan& plan, SceneWriter::Start start)
     : plan_(plan),
-      writer_(plan.options.scene,
-              plan.options.common.overwrite ? Existing::kReplace : Existing::kRefuse, start),
+      writer_(plan.options.scene, existing(plan.options.common), start),
       records_(plan.steps.size()) {
   writer_.keep_unfinished();
   // Others may be writing where the folder is shared.
