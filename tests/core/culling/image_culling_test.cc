@@ -5,25 +5,11 @@
 #include <cmath>
 #include <random>
 
-#include "core/occlusion/squares.h"
 #include "core/raster/rasterise.h"
-#include "tests/support/terrain.h"
+#include "tests/support/grouped_ground.h"
 
 namespace scarp {
 namespace {
-
-struct Scene {
-  Tin tin;
-  Groups groups;
-};
-
-Scene hills(std::uint32_t seed) {
-  Scene scene{test::triangulated(test::random_hills(40, 40, 10, seed, 120, 0.01), seed), {}};
-  const LeafGroups leaves = group_by_squares(scene.tin, 24);
-  scene.groups.group_of_triangle = leaves.group_of_triangle;
-  scene.groups.leaf_count = leaves.count;
-  return scene;
-}
 
 Shot random_shot(const Tin& tin, std::mt19937& random) {
   const auto unit = [&] { return std::uniform_real_distribution<double>(0, 1)(random); };
@@ -38,22 +24,10 @@ Shot random_shot(const Tin& tin, std::mt19937& random) {
   return shot;
 }
 
-Target draw(const GroupBatches& batches, std::span<const GroupIndex> groups, const Shot& shot,
-            int scale) {
-  GroupBatches::Drawing drawing;
-  for (const GroupIndex g : groups) batches.add_to(g, drawing);
-  batches.add_to(batches.groups(), drawing);
-  Target target = empty_target(shot.width_px * scale, shot.height_px * scale);
-  rasterise(target,
-            project_all(look_at(shot.view, target.width_px, target.height_px), drawing.vertices),
-            drawing.triangles, drawing.objects);
-  return target;
-}
-
 TEST(HzbCulling, LeavesEveryPixelAsItIsAtAnyResolution) {
   std::size_t left_out = 0, asked = 0;
   for (std::uint32_t seed = 1; seed <= 4; ++seed) {
-    const Scene scene = hills(seed);
+    const test::GroupedGround scene = test::grouped_hills(seed);
     const GroupBatches batches(scene.tin, scene.groups);
     ImageCullingOptions options;
     options.width_px = 96;
@@ -68,8 +42,8 @@ TEST(HzbCulling, LeavesEveryPixelAsItIsAtAnyResolution) {
       asked += answer.nodes_tested;
       left_out += answer.nodes_tested - answer.visible_groups.size();
       for (const int scale : {1, 3})
-        ASSERT_EQ(draw(batches, answer.visible_groups, shot, scale).object,
-                  draw(batches, all, shot, scale).object)
+        ASSERT_EQ(test::picture_of(batches, answer.visible_groups, shot, scale).object,
+                  test::picture_of(batches, all, shot, scale).object)
             << "seed " << seed << ", shot " << i << ", scale " << scale;
     }
   }
@@ -77,7 +51,7 @@ TEST(HzbCulling, LeavesEveryPixelAsItIsAtAnyResolution) {
 }
 
 TEST(Frustum, ShowsEveryBoxOfWhichATriangleIsDrawn) {
-  const Scene scene = hills(7);
+  const test::GroupedGround scene = test::grouped_hills(7);
   const GroupBatches batches(scene.tin, scene.groups);
   std::vector<GroupIndex> all;
   for (GroupIndex g = 0; g < batches.groups(); ++g) all.push_back(g);
@@ -86,7 +60,7 @@ TEST(Frustum, ShowsEveryBoxOfWhichATriangleIsDrawn) {
   for (int i = 0; i < 20; ++i) {
     const Shot shot = random_shot(scene.tin, random);
     const Frustum frustum(look_at(shot.view, shot.width_px, shot.height_px));
-    for (const std::uint32_t object : draw(batches, all, shot, 1).object) {
+    for (const std::uint32_t object : test::picture_of(batches, all, shot, 1).object) {
       if (object == kNone) continue;
       const GroupIndex group = scene.groups.group_of_triangle[object];
       if (group != kNone) {

@@ -7,9 +7,8 @@
 #include <random>
 
 #include "core/culling/image_culling.h"
-#include "core/occlusion/squares.h"
 #include "core/raster/rasterise.h"
-#include "tests/support/terrain.h"
+#include "tests/support/grouped_ground.h"
 
 namespace scarp {
 namespace {
@@ -120,35 +119,11 @@ TEST(Erode, AnErodedUnionOfOccludersLeaksBetweenThem) {
   EXPECT_EQ(map.depth[middle], 0);
 }
 
-struct Scene {
-  Tin tin;
-  Groups groups;
-};
-
-Scene hills(std::uint32_t seed) {
-  Scene scene{test::triangulated(test::random_hills(40, 40, 10, seed, 120, 0.01), seed), {}};
-  const LeafGroups leaves = group_by_squares(scene.tin, 24);
-  scene.groups.group_of_triangle = leaves.group_of_triangle;
-  scene.groups.leaf_count = leaves.count;
-  return scene;
-}
-
-Target draw(const GroupBatches& batches, std::span<const GroupIndex> groups, const Shot& shot) {
-  GroupBatches::Drawing drawing;
-  for (const GroupIndex g : groups) batches.add_to(g, drawing);
-  batches.add_to(batches.groups(), drawing);
-  Target target = empty_target(shot.width_px, shot.height_px);
-  rasterise(target,
-            project_all(look_at(shot.view, target.width_px, target.height_px), drawing.vertices),
-            drawing.triangles, drawing.objects);
-  return target;
-}
-
 /// Walks over hills and calls visit(step, answer, method) at each of the frames.
 void walk(std::uint32_t seed, double step_m, const MaskOptions& options,
           const std::function<void(const GroupBatches&, const Shot&, const CullingAnswer&,
                                    const MaskCulling&)>& visit) {
-  const Scene scene = hills(seed);
+  const test::GroupedGround scene = test::grouped_hills(seed);
   const GroupBatches batches(scene.tin, scene.groups);
   const BoxTree tree(batches);
   MaskCulling mask(scene.tin, batches, tree, options);
@@ -173,8 +148,8 @@ TEST(MaskCulling, LeavesEveryPixelAsItIsWhereTheMaskIsNew) {
          [&](const auto& batches, const Shot& shot, const auto& answer, const MaskCulling& mask) {
            std::vector<GroupIndex> all;
            for (GroupIndex g = 0; g < batches.groups(); ++g) all.push_back(g);
-           ASSERT_EQ(draw(batches, answer.visible_groups, shot).object,
-                     draw(batches, all, shot).object);
+           ASSERT_EQ(test::picture_of(batches, answer.visible_groups, shot).object,
+                     test::picture_of(batches, all, shot).object);
            const Frustum frustum(look_at(shot.view, shot.width_px, shot.height_px));
            for (const GroupIndex g : all) left_out += frustum.may_show(batches.box(g));
            left_out -= answer.visible_groups.size();
@@ -196,7 +171,7 @@ TEST(MaskCulling, KeepsItsMaskWhileTheMarginPaysForTheWay) {
 }
 
 TEST(BoxTree, HoldsEveryGroupOnceInBoxesThatHoldItsChildren) {
-  const Scene scene = hills(3);
+  const test::GroupedGround scene = test::grouped_hills(3);
   const GroupBatches batches(scene.tin, scene.groups);
   const BoxTree tree(batches);
   std::vector<int> found(batches.groups(), 0);

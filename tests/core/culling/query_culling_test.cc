@@ -6,30 +6,21 @@
 #include <cmath>
 #include <set>
 
-#include "core/occlusion/squares.h"
+#include "tests/support/grouped_ground.h"
 #include "tests/support/terrain.h"
 
 namespace scarp {
 namespace {
 
 /// A ridge across the view with ground before and behind it.
-struct Scene {
-  Tin tin;
-  Groups groups;
-};
-
-Scene ridge() {
-  Scene scene{test::triangulated(test::grid_of(48, 48, 10,
-                                               [](std::int32_t, std::int32_t row) {
-                                                 return 100 *
-                                                        std::exp(-std::pow((row - 24) / 3.0, 2));
-                                               }),
-                                 1),
-              {}};
-  const LeafGroups leaves = group_by_squares(scene.tin, 64);
-  scene.groups.group_of_triangle = leaves.group_of_triangle;
-  scene.groups.leaf_count = leaves.count;
-  return scene;
+test::GroupedGround ridge() {
+  return test::grouped_by_squares(
+      test::triangulated(test::grid_of(48, 48, 10,
+                                       [](std::int32_t, std::int32_t row) {
+                                         return 100 * std::exp(-std::pow((row - 24) / 3.0, 2));
+                                       }),
+                         1),
+      64);
 }
 
 Camera camera_at(double x_m, double y_m) {
@@ -59,7 +50,7 @@ class Queries : public testing::Test {
     return found;
   }
 
-  Scene scene_ = ridge();
+  test::GroupedGround scene_ = ridge();
   GroupBatches batches_{scene_.tin, scene_.groups};
   CoarseBatches coarse_{batches_, {0.5, 0.2}};
 };
