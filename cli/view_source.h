@@ -39,7 +39,12 @@ class ViewSource {
   const Dem& dem() const { return ground_.dem; }
   /// Its samples, where targets stand.
   const GroundGrid& samples() const { return ground_.grid; }
+  /// Exact until it is approximated.
   ViewGround ground() const;
+  /// From now on ground() is what an accuracy takes for it, and eyes are placed over that: the
+  /// raster of a scene's heights in place of its mesh, bounds in place of exact decisions, and, if
+  /// fast, every second sample.
+  void approximate(Accuracy accuracy);
 
   /// Tiles of a scene, and how many of them were read; 0 of a DEM.
   std::size_t tiles() const { return scene_ ? scene_->tiles.size() : 0; }
@@ -68,6 +73,8 @@ class ViewSource {
   Ground ground_;
   std::optional<GroundGrid> obstacles_;
   std::optional<GroundTops> tops_;  // of a DEM
+  Accuracy accuracy_ = Accuracy::kExact;
+  std::optional<ThinnedGround> thinned_;  // if fast
 };
 
 }  // namespace scarp

@@ -110,6 +110,7 @@ void check_total(const ViewshedOptions& options) {
                        : options.pitch_deg                      ? "--pitch"
                        : !options.polygons.empty()              ? "--polygons"
                        : options.gdal_values                    ? "--gdal-values"
+                       : options.accuracy != Accuracy::kExact   ? "--accuracy"
                        : options.mode != ViewshedMode::kVisible ? "--mode"
                                                                 : nullptr;
   if (single)
@@ -216,6 +217,7 @@ class ViewshedRun {
     if (options_.max_distance_m && options_.observers_file.empty() && !options_.total)
       reach = ViewReach{options_.observers, options_.crs, *options_.max_distance_m};
     source_.emplace(options_.sources, options_.obstacles, dem, progress, reach);
+    source_->approximate(options_.accuracy);
     for (const TypedPosition& typed : options_.observers)
       eyes_.push_back({source_->place(typed, options_.crs), options_.target_height_m,
                        limits_of(options_.min_distance_m, options_.max_distance_m,
@@ -492,6 +494,8 @@ class ViewshedRun {
     for (std::size_t i = first; i < std::min(end, first + kMostNamed); ++i)
       observers += fmt::format("{}{:.10g},{:.10g},{:.3f}asl", i > first ? " " : "",
                                eyes_[i].at.map.x, eyes_[i].at.map.y, eyes_[i].at.map.height_m);
+    // --total says how exact it is by itself.
+    if (!options_.total) metadata["ACCURACY"] = name_of(options_.accuracy);
     metadata["MODE"] = options_.total ? "total" : name_of(options_.mode);
     write_note(note_of(source_->surface(), frame), metadata);
     metadata["HEIGHT_UNIT_OF_DEM"] = source_->dem().height_unit;
@@ -520,10 +524,13 @@ class ViewshedRun {
   }
 
   nlohmann::json summary() const {
-    nlohmann::json result = {
-        {"output", options_.output},           {"tiles", source_->tiles()},
-        {"tiles_read", source_->tiles_read()}, {"columns", source_->samples().columns()},
-        {"rows", source_->samples().rows()},   {"observers", eyes_.size()}};
+    nlohmann::json result = {{"output", options_.output},
+                             {"tiles", source_->tiles()},
+                             {"tiles_read", source_->tiles_read()},
+                             {"columns", source_->samples().columns()},
+                             {"rows", source_->samples().rows()},
+                             {"observers", eyes_.size()},
+                             {"accuracy", name_of(options_.accuracy)}};
     if (!options_.polygons.empty()) result["polygons"] = options_.polygons;
     if (options_.total) {
       result["looks"] = looks_;
