@@ -317,7 +317,7 @@ ComparedRun measure(const Options& options, const std::string& dem, const fs::pa
   const TinIndex index(mesh.tin);
   all.jobs.push_back(compare_groups(
       {mesh.tin, index, *ground.dem.frame, {}, "scarp build DEM -o S --vertices 8000"}, {},
-      [](const std::string&) { return Progress(); }));
+      [](const std::string&) { return Progress([](double) {}); }));
   say("flight");
   all.jobs.push_back(compare_flight((programs.parent_path() / "scarp").string(), dem, folder));
   say("scale");
