@@ -21,7 +21,7 @@ namespace {
 using nlohmann::json;
 
 std::string picture_name(const ComparedJob& job, const ComparedChart& chart) {
-  return fmt::format("{}-{}.svg", job.name, chart.x);
+  return fmt::format("{}-{}-by-{}.svg", job.name, chart.y, chart.x);
 }
 
 bool has_point(const ComparedJob& job, const ComparedChart& chart) {
@@ -158,7 +158,8 @@ json to_json(const ComparedRun& run) {
       const std::vector<bool> on_front = pareto_front(job.points, chart.x, chart.y);
       for (std::size_t i = 0; i < on_front.size(); ++i)
         if (on_front[i]) front.push_back(i);
-      charts.push_back({{"x", chart.x}, {"y", chart.y}, {"front", front}});
+      charts.push_back(
+          {{"x", chart.x}, {"y", chart.y}, {"front", front}, {"file", picture_name(job, chart)}});
     }
     result["jobs"].push_back({{"name", job.name},
                               {"title", job.title},

@@ -23,7 +23,7 @@ std::map<std::string, std::string> machine_facts();
 nlohmann::json to_json(const ComparedRun& run);
 
 /// Writes compare.html, which needs no other file and no network, compare.json, compare.csv (a line
-/// a point and figure), and a picture for each chart, JOB-FIGURE.svg. Throws Error.
+/// a point and figure), and a picture for each chart, JOB-ERROR-by-COST.svg. Throws Error.
 void write_comparison(const ComparedRun& run, const std::string& folder, Existing existing);
 
 }  // namespace scarp

@@ -64,8 +64,7 @@ void expect_whole_page(const std::string& folder, const json& result) {
   EXPECT_EQ(page.find("http"), page.find("http://www.w3.org/2000/svg")) << "needs the network";
   for (const json& job : result["jobs"])
     for (const json& chart : job["charts"]) {
-      const std::string name =
-          job["name"].get<std::string>() + "-" + chart["x"].get<std::string>() + ".svg";
+      const std::string name = chart["file"];
       CPLXMLNode* svg = CPLParseXMLString(read_text(folder + "/" + name).c_str());
       ASSERT_NE(svg, nullptr) << name;
       EXPECT_STREQ(svg->pszValue, "svg");
