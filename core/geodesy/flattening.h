@@ -46,6 +46,14 @@ class Flattening {
   /// The inverse, for what leaves the program. Exact up to rounding.
   EcefPoint unflatten(const Position& p) const;
 
+  /// What the map is made of, for formats that repeat it: unit vectors, D and k D^2 / R.
+  const EcefPoint& origin() const { return origin_; }
+  const EcefPoint& east() const { return east_; }
+  const EcefPoint& north() const { return north_; }
+  const EcefPoint& up() const { return up_; }
+  double scale_m() const { return scale_m_; }
+  double bend_m() const { return bend_m_; }
+
  private:
   EcefPoint origin_;
   EcefPoint east_, north_, up_;  // unit vectors

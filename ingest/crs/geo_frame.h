@@ -55,6 +55,8 @@ class GeoFrame {
 
   const FrameDescription& description() const { return description_; }
   bool is_geographic() const { return geographic_; }
+  /// Of a flat frame: what map coordinates are multiplied by.
+  double metres_per_unit() const { return metres_per_unit_; }
   /// The ellipsoid and the frame on it, for what core computes on the Earth; nothing where flat.
   std::optional<EarthFrame> earth_frame() const;
 
