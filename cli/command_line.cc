@@ -8,6 +8,7 @@
 
 #include "cli/build/certified_settings.h"
 #include "cli/commands.h"
+#include "cli/export.h"
 #include "cli/stage_clock.h"
 #include "core/error/error.h"
 #include "core/threads/parallel_for.h"
@@ -336,7 +337,9 @@ void add_horizon(CLI::App& app, HorizonOptions& o, std::function<int()>& run) {
 
 void add_cull(CLI::App& app, CullOptions& o, std::function<int()>& run) {
   CLI::App* c = app.add_subcommand("cull", "Which groups a camera can see");
-  c->footer("Example:\n  scarp cull alps.scene --camera 8.65,46.55,50 --crs OGC:CRS84 --json");
+  c->footer(
+      "Examples:\n  scarp cull alps.scene --camera 8.65,46.55,50 --crs OGC:CRS84 --json\n"
+      "  scarp cull alps.scene --camera 8.65,46.55,50 --crs OGC:CRS84 --entities vehicles.csv");
   c->add_option("scene", o.scene, "A scene")->required();
   c->add_option_function<std::string>(
        "--camera", [&o](const std::string& text) { o.camera = parse_position(text); },
@@ -355,6 +358,23 @@ void add_cull(CLI::App& app, CullOptions& o, std::function<int()>& run) {
   c->add_option("--max-distance", o.max_distance_m,
                 "Leave out groups beyond this, metres in plan; tiles beyond it are not read")
       ->check(CLI::PositiveNumber);
+  auto* entities = c->add_option(
+      "--entities", o.entities_file,
+      "Points of any file that OGR reads: tell which can be seen at all, so that the rest can "
+      "sleep. Attributes: name, height (of the top above ground) or elevation, radius; the options "
+      "hold for what is missing");
+  c->add_option("--entity-radius", o.entity_radius_m, "Metres; 2 unless given")
+      ->needs(entities)
+      ->check(CLI::Range(0.0, 10'000.0));
+  c->add_option("--entity-height", o.entity_height_m,
+                "Metres from the ground to the top; 2 unless given")
+      ->needs(entities)
+      ->check(CLI::Range(-1'000.0, 100'000.0));
+  c->add_option("--within", o.within_m,
+                "With --entities: the answer holds while the camera is this near to --camera along "
+                "each axis, metres; 0 unless given")
+      ->needs(entities)
+      ->check(CLI::Range(0.0, 1e6));
   add_common(*c, o.common);
   c->callback([&] { run = [&o] { return run_cull(o); }; });
 }
@@ -469,6 +489,45 @@ void add_check(CLI::App& app, CheckOptions& o, std::function<int()>& run) {
   c->callback([&] { run = [&o] { return run_check(o); }; });
 }
 
+void add_vdb_options(CLI::App& command, ExportOptions& o) {
+  command.add_option_function<std::string>(
+      "--observer", position_into(o.observer),
+      "vdb: what an eye at X,Y[,H] sees of the airspace instead of view cells");
+  command.add_option("--crs", o.crs,
+                     "vdb: CRS of --observer, such as OGC:CRS84; the scene's unless given");
+  command
+      .add_option("--altitudes", o.altitudes_m,
+                  "vdb: metres above the highest ground of a column where the bands of view cells "
+                  "end; 10,25,50,100,200,400,700,1000 unless given. With --observer the last one "
+                  "counts")
+      ->delimiter(',')
+      ->check(CLI::Range(0.0, 100'000.0));
+  command
+      .add_option("--cell", o.cell_m,
+                  "vdb: side of a cell, metres; a 64th of the scene unless given, with --observer "
+                  "a 128th")
+      ->check(CLI::Range(0.1, 1e6));
+}
+
+void add_export(CLI::App& app, ExportOptions& o, std::function<int()>& run) {
+  CLI::App* c = app.add_subcommand("export", "Write a scene for simulators and GIS");
+  c->footer(
+      "Examples:\n  scarp export alps.scene --to groups -o alps-groups\n"
+      "  scarp export alps.scene --to vdb -o alps-cells --altitudes 2,50,300,1000\n"
+      "  scarp export alps.scene --to vdb -o alps-seen --observer 8.65,46.55,300 --crs OGC:CRS84");
+  c->add_option("scene", o.scene, "A scene")->required();
+  c->add_option("-o,--output", o.output, "A new folder")->required();
+  std::string names;
+  for (const Exporter& exporter : exporters())
+    names += fmt::format("{}{}: {}", names.empty() ? "" : "; ", exporter.name, exporter.help);
+  c->add_option("--to", o.to, names)->required()->check([](const std::string& text) {
+    return find_exporter(text) != nullptr ? "" : text + " is not a format that is known";
+  });
+  add_vdb_options(*c, o);
+  add_common(*c, o.common);
+  c->callback([&] { run = [&o] { return run_export(o); }; });
+}
+
 /// "Error: message" without line breaks, so that scripts can rely on one line.
 int report(const std::string& message, int exit_code) {
   std::string line = message;
@@ -494,6 +553,7 @@ int run_command_line(int argc, char** argv) {
   SightOptions sight;
   HorizonOptions horizon;
   CheckOptions check;
+  ExportOptions to;
   std::function<int()> run;
   add_build(app, build, run);
   add_cull(app, cull, run);
@@ -505,6 +565,7 @@ int run_command_line(int argc, char** argv) {
   add_sight(app, sight, run);
   add_horizon(app, horizon, run);
   add_check(app, check, run);
+  add_export(app, to, run);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& e) {
@@ -515,9 +576,9 @@ int run_command_line(int argc, char** argv) {
     return report(e.what(), 2);
   }
   try {
-    for (CommonOptions* common :
-         {&build.common, &cull.common, &verify.common, &compare.common, &fly.common,
-          &preview.common, &viewshed.common, &sight.common, &horizon.common, &check.common}) {
+    for (CommonOptions* common : {&build.common, &cull.common, &verify.common, &compare.common,
+                                  &fly.common, &preview.common, &viewshed.common, &sight.common,
+                                  &horizon.common, &check.common, &to.common}) {
       if (!common->memory_budget_bytes) common->memory_budget_bytes = machine_memory_bytes() / 2;
       if (common->threads) set_thread_count(common->threads);
     }

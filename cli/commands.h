@@ -8,6 +8,8 @@ namespace scarp {
 /// Error, and return the exit code.
 int run_build(const BuildOptions& options);
 int run_cull(const CullOptions& options);
+/// Which of many points can be seen at all.
+int run_cull_entities(const CullOptions& options);
 int run_verify(const VerifyOptions& options);
 int run_compare(const CompareOptions& options);
 int run_fly(const FlyOptions& options);
@@ -17,6 +19,7 @@ int run_sight(const SightOptions& options);
 int run_horizon(const HorizonOptions& options);
 /// Horizons of all samples of a DEM, and what is made of them.
 int run_all_horizons(const HorizonOptions& options);
+int run_export(const ExportOptions& options);
 int run_check(const CheckOptions& options);
 
 /// Parses the command line and runs the subcommand. Exit code: 0 done, 1 the input or a resource

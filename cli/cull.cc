@@ -47,6 +47,7 @@ void cull_tile(const Groups& groups, GroupIndex first_group, CullingMethod& meth
 }  // namespace
 
 int run_cull(const CullOptions& options) {
+  if (!options.entities_file.empty()) return run_cull_entities(options);
   const double begun_s = seconds_now();
   SceneTiles tiles(options.scene);
   const double opened_s = seconds_now();

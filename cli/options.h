@@ -154,6 +154,10 @@ struct CullOptions {
   std::optional<double> azimuth_deg;  ///< of the view's middle; none: all around
   double field_of_view_deg = 90;
   std::optional<double> max_distance_m;
+  std::string entities_file;  ///< points whose sight is asked for instead of groups; empty: none
+  double entity_radius_m = 2;
+  double entity_height_m = 2;  ///< of their tops, above ground
+  double within_m = 0;         ///< how far the camera may be from where it is said to be
 };
 
 struct VerifyOptions {
@@ -204,6 +208,19 @@ struct PreviewCommandOptions {
 struct CheckOptions {
   CommonOptions common;
   std::string scene;
+};
+
+struct ExportOptions {
+  CommonOptions common;
+  std::string scene;
+  std::string output;  ///< a folder
+  std::string to;      ///< name of an exporter (export.h)
+  // vdb:
+  std::optional<TypedPosition> observer;
+  std::string crs;  ///< of the observer; empty: the scene's
+  std::vector<double>
+      altitudes_m;               ///< above ground, where bands end; empty: those of export_vdb.cc
+  std::optional<double> cell_m;  ///< side of a view cell
 };
 
 /// Reads "X,Y[,H]". Throws Error{kUsage}.

@@ -5,6 +5,7 @@
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/tiles/reseal.h"
 #include "tests/tiles/small_scene.h"
+#include "tiles/cells/sets_file.h"
 #include "tiles/store/groups_file.h"
 #include "tiles/store/horizon_file.h"
 #include "tiles/store/tin_file.h"
@@ -37,6 +38,10 @@ void read_as_every_kind(const std::vector<std::byte>& bytes, Verify verify) {
   });
   read_or_refuse(bytes, verify, read_horizon);
   read_or_refuse(bytes, verify, [](const SectionFile& file) {
+    const HiddenSets sets = read_sets(file);
+    (void)groups_of(sets, static_cast<std::uint32_t>(sets.size() - 1));
+  });
+  read_or_refuse(bytes, verify, [](const SectionFile& file) {
     const Groups groups = read_groups(file);
     if (groups.has_certified()) (void)CertifiedCulling(groups.certified).visible({{30, 70, 2}, {}});
   });
@@ -64,6 +69,7 @@ std::vector<std::vector<std::uint8_t>> fuzz_seeds() {
        {tin_writer(tin, samples).to_bytes(), tin_writer(Tin{}).to_bytes(),
         compact_tin_writer(tin, samples).to_bytes(),
         horizon_writer(test::small_horizons(tin)).to_bytes(),
+        sets_writer({{0, 0, 1, 1}, {0, 0, 2, 3, 5}, {4, 7, 5, 1, 2}}).to_bytes(),
         groups_writer(test::small_groups(tin)).to_bytes(),
         groups_writer(test::small_certified_groups(tin)).to_bytes(),
         groups_writer(Groups{}).to_bytes()}) {

@@ -59,10 +59,10 @@ int main(int argc, char** argv) {
     const Box box = culling.box_in_frame(q[8] - half, q[9] - half, q[8] + half, q[9] + half, q[3]);
     const double corners[] = {q[1], q[2], q[3], q[1] + half, q[2] + half, q[3] + half};
     const Box hull = culling.box(corners, 2);
-    std::printf("%u %08x %u %08x %08x %d %d %d %d %d %s\n", all, all_hash, some,
+    std::printf("%u %08x %u %08x %08x %d %d %d %d %d %d %s\n", all, all_hash, some,
                 hash_of(groups.get(), some), tiles.value(), culling.box_visible(camera, box),
-                culling.box_visible(camera, hull), hull.low_x, hull.high_y, hull.top,
-                is_same ? "same" : "DIFFERS");
+                culling.box_visible(camera, hull), culling.box_visible(hull, box), hull.low_x,
+                hull.high_y, hull.top, is_same ? "same" : "DIFFERS");
   }
   std::fclose(questions);
   return 0;

@@ -33,7 +33,7 @@ for (let i = 0; i + 10 < q.length; i += 11) {
   const box = culling.boxInFrame(atX - half, atY - half, atX + half, atY + half, z);
   const hull = culling.box([x, y, z, x + half, y + half, z + half]);
   lines.push(`${all} ${allHash} ${some} ${someHash} ${hashOf(tiles, tiles.length)} ` +
-    `${+culling.boxVisible(camera, box)} ${+culling.boxVisible(camera, hull)} ${hull.lowX} ` +
+    `${+culling.boxVisible(camera, box)} ${+culling.boxVisible(camera, hull)} ${+culling.boxVisibleFromCell(hull, box)} ${hull.lowX} ` +
     `${hull.highY} ${hull.top} ${isSame ? 'same' : 'DIFFERS'}`);
 }
 process.stdout.write(lines.map((line) => line + '\n').join(''));

@@ -547,22 +547,28 @@ export class Culling {
 
   // Whether something in a box may be seen: false only where ground hides all of it for certain.
   boxVisible(camera, box) {
-    if (!camera.isValid || !box.isValid || this.columns === 0) return true;
-    const lowX = box.lowX - camera.x;
-    const highX = box.highX - camera.x;
-    const lowY = box.lowY - camera.y;
-    const highY = box.highY - camera.y;
-    const rise = box.top - camera.z;
+    return this.boxVisibleFromCell({
+      lowX: camera.x, lowY: camera.y, highX: camera.x, highY: camera.y, top: camera.z,
+      isValid: camera.isValid,
+    }, box);
+  }
+
+  // The same from every camera in a cell, a box: in its plan, and not above its top.
+  boxVisibleFromCell(cell, box) {
+    if (!cell.isValid || !box.isValid || this.columns === 0) return true;
     const top = this.base + this.highest * this.heightStep;
-    const way = Math.max(Math.abs(lowX + highX), Math.abs(lowY + highY)) / (2 * this.cell);
+    const wayX = box.lowX + box.highX - (cell.lowX + cell.highX);
+    const wayY = box.lowY + box.highY - (cell.lowY + cell.highY);
+    const way = Math.max(Math.abs(wayX), Math.abs(wayY)) / (2 * this.cell);
     const parts = Math.min(Math.floor(way) + 2, 4096);
     for (let part = parts - 1; part >= 1; --part) {
-      const height = camera.z + Math.floor(rise * part / parts) + 1;
+      const rest = parts - part;
+      const height = Math.floor((cell.top * rest + box.top * part) / parts) + 1;
       if (height >= top) continue;
-      if (this.#isGroundAbove(camera.x + Math.floor(lowX * part / parts) - 1,
-        camera.y + Math.floor(lowY * part / parts) - 1,
-        camera.x + Math.floor(highX * part / parts) + 2,
-        camera.y + Math.floor(highY * part / parts) + 2, height))
+      if (this.#isGroundAbove(Math.floor((cell.lowX * rest + box.lowX * part) / parts) - 1,
+        Math.floor((cell.lowY * rest + box.lowY * part) / parts) - 1,
+        Math.floor((cell.highX * rest + box.highX * part) / parts) + 2,
+        Math.floor((cell.highY * rest + box.highY * part) / parts) + 2, height))
         return false;
     }
     return true;

@@ -255,6 +255,17 @@ class Culling {
   double unit_m() const {
     return 1 / units_per_m_;
   }
+  GroupRecord record(std::uint32_t group) const {
+    return {x_[group],
+            y_[group],
+            height_[group],
+            inverse_[group],
+            low_[group],
+            step_[group],
+            box_ + std::size_t{group} * 6,
+            steps_ + std::size_t{group} * sectors_ * 4,
+            sectors_};
+  }
 
   /// The camera at a place: ECEF metres; of a flat scene metres of the map.
   Camera camera(double x, double y, double z) const;
@@ -291,9 +302,12 @@ class Culling {
   ///
   /// Every line from the camera to a place of the box passes through the box shrunk towards the
   /// camera by any factor, and there it is no higher than the line to the box's top: where the
-  /// ground under all of the shrunk box is higher, nothing of the box is seen.
+  /// ground under all of the shrunk box is higher, nothing of the box is seen. From a cell of
+  /// cameras the same holds of the boxes between it and the other.
   /// Cost: a few look-ups for each cell of heights between the two.
   bool box_visible(const Camera& camera, const Box& box) const;
+  /// The same from every camera in a cell: in its plan, and not above its top.
+  bool box_visible(const Box& cell, const Box& box) const;
 
  private:
   friend class MovingView;
@@ -946,24 +960,33 @@ inline bool Culling::is_ground_above(double low_x, double low_y, double high_x, 
 }
 
 inline bool Culling::box_visible(const Camera& camera, const Box& box) const {
-  if (!camera.is_valid || !box.is_valid || columns_ == 0) return true;
-  const double low_x = double(box.low_x) - camera.x, high_x = double(box.high_x) - camera.x;
-  const double low_y = double(box.low_y) - camera.y, high_y = double(box.high_y) - camera.y;
-  const double rise = double(box.top) - camera.z;
+  Box cell;
+  cell.low_x = cell.high_x = camera.x;
+  cell.low_y = cell.high_y = camera.y;
+  cell.top = camera.z;
+  cell.is_valid = camera.is_valid;
+  return box_visible(cell, box);
+}
+
+inline bool Culling::box_visible(const Box& cell, const Box& box) const {
+  if (!cell.is_valid || !box.is_valid || columns_ == 0) return true;
   const double top = double(base_) + highest_ * detail::power_of_2(static_cast<int>(height_bits_));
-  // Ways to the middle, in cells: about one look-up a cell.
-  const double cell = detail::power_of_2(static_cast<int>(cell_bits_));
-  const double way =
-      detail::most(std::fabs(low_x + high_x), std::fabs(low_y + high_y)) / (2 * cell);
+  // Ways from middle to middle, in cells: about one look-up a cell.
+  const double size = detail::power_of_2(static_cast<int>(cell_bits_));
+  const double way_x = (double(box.low_x) + box.high_x) - (double(cell.low_x) + cell.high_x);
+  const double way_y = (double(box.low_y) + box.high_y) - (double(cell.low_y) + cell.high_y);
+  const double way = detail::most(std::fabs(way_x), std::fabs(way_y)) / (2 * size);
   const double parts = detail::least(detail::floor_of(way) + 2, 4096);
   for (double part = parts - 1; part >= 1; --part) {
-    // Rounded outwards and upwards; a unit each way for the rounding of the camera.
-    const double height = double(camera.z) + detail::floor_of(rise * part / parts) + 1;
+    const auto between = [&](std::int32_t from, std::int32_t to) {
+      return detail::floor_of((from * (parts - part) + to * part) / parts);
+    };
+    // Rounded outwards and upwards; a unit each way for the rounding of a camera.
+    const double height = between(cell.top, box.top) + 1;
     if (height >= top) continue;
-    if (is_ground_above(double(camera.x) + detail::floor_of(low_x * part / parts) - 1,
-                        double(camera.y) + detail::floor_of(low_y * part / parts) - 1,
-                        double(camera.x) + detail::floor_of(high_x * part / parts) + 2,
-                        double(camera.y) + detail::floor_of(high_y * part / parts) + 2, height))
+    if (is_ground_above(between(cell.low_x, box.low_x) - 1, between(cell.low_y, box.low_y) - 1,
+                        between(cell.high_x, box.high_x) + 2, between(cell.high_y, box.high_y) + 2,
+                        height))
       return false;
   }
   return true;
