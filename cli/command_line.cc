@@ -507,6 +507,11 @@ void add_vdb_options(CLI::App& command, ExportOptions& o) {
                   "vdb: side of a cell, metres; a 64th of the scene unless given, with --observer "
                   "a 128th")
       ->check(CLI::Range(0.1, 1e6));
+  command
+      .add_option("--keep", o.keep,
+                  "vdb: where the set of a larger cell has this share of what smaller ones have, "
+                  "it stands for theirs; 0.95 unless given, 1 leaves nothing out")
+      ->check(CLI::Range(0.0, 1.0));
 }
 
 void add_export(CLI::App& app, ExportOptions& o, std::function<int()>& run) {

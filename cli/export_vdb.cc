@@ -128,7 +128,7 @@ void export_view_cells(const ExportOptions& options, const LoadedScene& scene,
   const CullingSource source = culling_source(scene);  // refuses a scene without regions
   ViewCells cells = columns_of(scene, options, altitudes_m);
   stages.run("sets", [&](const Progress& progress) {
-    find_hidden_sets(source.groups->certified, cells, progress);
+    find_hidden_sets(source.groups->certified, options.keep, cells, progress);
   });
   auto metadata = metadata_of(scene);
   metadata["ALTITUDES_M"] = fmt::format("{}", fmt::join(altitudes_m, ","));

@@ -221,6 +221,7 @@ struct ExportOptions {
   std::vector<double>
       altitudes_m;               ///< above ground, where bands end; empty: those of export_vdb.cc
   std::optional<double> cell_m;  ///< side of a view cell
+  double keep = 0.95;            ///< of the members of sets, where cells share one
 };
 
 /// Reads "X,Y[,H]". Throws Error{kUsage}.

@@ -29,8 +29,8 @@ struct Square {
 
 class Finder {
  public:
-  Finder(const CertifiedRegions& regions, const ViewCells& cells)
-      : regions_(regions), cells_(cells) {}
+  Finder(const CertifiedRegions& regions, const ViewCells& cells, double keep)
+      : regions_(regions), cells_(cells), keep_(keep) {}
 
   /// Highest top in a square, -infinity where no column of it has one.
   double top_m(const Square& square) const {
@@ -63,36 +63,92 @@ class Finder {
     return hidden;
   }
 
-  /// Sets of a square's columns: nodes that hang below nodes[parent].
-  void divide(const Square& square, std::uint32_t parent, std::vector<GroupIndex> open,
-              std::vector<Node>& nodes, std::vector<std::uint32_t>& node_of_cell) const {
-    if (square.column >= cells_.columns || square.row >= cells_.rows) return;
+  /// What can be hidden from a square's cells, all their sets together, and how many cells these
+  /// are.
+  struct Tally {
+    std::size_t members = 0, cells = 0;
+  };
+
+  /// Sets of a square's columns: nodes that hang below nodes[parent], whose set has `held` members.
+  Tally divide(const Square& square, std::uint32_t parent, std::size_t held,
+               std::vector<GroupIndex> open, std::vector<Node>& nodes,
+               std::vector<std::uint32_t>& node_of_cell) const {
+    if (square.column >= cells_.columns || square.row >= cells_.rows) return {};
     const double top = top_m(square);
-    if (top == -HUGE_VAL) return;
-    const auto add = [&](std::uint32_t to, double height_m) {
-      std::vector<GroupIndex> hidden = take_hidden(square, height_m, open);
-      if (hidden.empty()) return to;
-      nodes.push_back({to, std::move(hidden)});
-      return static_cast<std::uint32_t>(nodes.size() - 1);
-    };
-    std::uint32_t node = add(parent, top);
-    if (square.side == 1) {
-      for (std::int32_t band = cells_.bands - 1; band >= 0; --band) {
-        const std::size_t cell = cells_.at(square.column, square.row, band);
-        if (band < cells_.bands - 1) node = add(node, static_cast<double>(cells_.top_m[cell]));
-        node_of_cell[cell] = node;
-      }
-      return;
-    }
+    if (top == -HUGE_VAL) return {};
+    const std::uint32_t node = add(square, parent, top, open, nodes);
+    held += node == parent ? 0 : nodes[node].added.size();
+    if (square.side == 1)
+      return fill_column(square, node, held, std::move(open), nodes, node_of_cell);
+    const std::size_t before = nodes.size();
     const std::int32_t half = square.side / 2;
+    Tally tally;
     for (const std::int32_t down : {0, half})
-      for (const std::int32_t right : {0, half})
-        divide({square.column + right, square.row + down, half}, node, open, nodes, node_of_cell);
+      for (const std::int32_t right : {0, half}) {
+        const Tally part = divide({square.column + right, square.row + down, half}, node, held,
+                                  open, nodes, node_of_cell);
+        tally.members += part.members, tally.cells += part.cells;
+      }
+    if (!stands_for(held, tally)) return tally;
+    nodes.resize(before);
+    for_each_cell(square, [&](std::size_t cell) { node_of_cell[cell] = node; });
+    return tally;
+  }
+
+  /// Calls visit(cell) for each cell of a square that has a top.
+  template <class Visit>
+  void for_each_cell(const Square& square, Visit visit) const {
+    for (std::int32_t row = square.row; row < std::min(square.row + square.side, cells_.rows);
+         ++row)
+      for (std::int32_t column = square.column;
+           column < std::min(square.column + square.side, cells_.columns); ++column)
+        for (std::int32_t band = 0; band < cells_.bands; ++band) {
+          const std::size_t cell = cells_.at(column, row, band);
+          if (!std::isnan(cells_.top_m[cell])) visit(cell);
+        }
   }
 
  private:
+  bool stands_for(std::size_t held, const Tally& tally) const {
+    return static_cast<double>(held) * static_cast<double>(tally.cells) >=
+           keep_ * static_cast<double>(tally.members);
+  }
+
+  /// A node for what is hidden from below a height over a square, or the one above where that adds
+  /// nothing.
+  std::uint32_t add(const Square& square, std::uint32_t parent, double top_m,
+                    std::vector<GroupIndex>& open, std::vector<Node>& nodes) const {
+    std::vector<GroupIndex> hidden = take_hidden(square, top_m, open);
+    if (hidden.empty()) return parent;
+    nodes.push_back({parent, std::move(hidden)});
+    return static_cast<std::uint32_t>(nodes.size() - 1);
+  }
+
+  /// The bands of one column, from the highest, which `node` is, to the lowest.
+  Tally fill_column(const Square& square, std::uint32_t node, std::size_t held,
+                    std::vector<GroupIndex> open, std::vector<Node>& nodes,
+                    std::vector<std::uint32_t>& node_of_cell) const {
+    Tally tally;
+    for (std::int32_t band = cells_.bands - 1; band >= 0; --band) {
+      const std::size_t cell = cells_.at(square.column, square.row, band);
+      std::vector<GroupIndex> open_below = open;
+      const std::uint32_t lower =
+          add(square, node, static_cast<double>(cells_.top_m[cell]), open_below, nodes);
+      const std::size_t below = held + (lower == node ? 0 : nodes[lower].added.size());
+      if (lower != node && stands_for(held, {below, 1})) {
+        nodes.pop_back();
+      } else {
+        node = lower, held = below, open = std::move(open_below);
+      }
+      node_of_cell[cell] = node;
+      tally.members += below, ++tally.cells;
+    }
+    return tally;
+  }
+
   const CertifiedRegions& regions_;
   const ViewCells& cells_;
+  double keep_;
 };
 
 /// Numbers sets so that equal ones have one number.
@@ -140,6 +196,7 @@ class Numbering {
 struct Piece {
   Square square;
   std::uint32_t parent;  // among the nodes above all pieces
+  std::size_t held;      // members of its set
   std::vector<GroupIndex> open;
   std::vector<Node> nodes;
 };
@@ -157,9 +214,10 @@ std::vector<GroupIndex> groups_of(const HiddenSets& sets, std::uint32_t set) {
   return groups;
 }
 
-void find_hidden_sets(const CertifiedRegions& regions, ViewCells& cells, const Progress& progress) {
+void find_hidden_sets(const CertifiedRegions& regions, double keep, ViewCells& cells,
+                      const Progress& progress) {
   assert(cells.top_m.size() == cells.at(0, cells.rows, 0) && cells.bands > 0);
-  const Finder finder(regions, cells);
+  const Finder finder(regions, cells, keep);
   std::vector<GroupIndex> all(regions.groups.size());
   std::iota(all.begin(), all.end(), 0U);
   std::int32_t side = kPieceColumns;
@@ -167,7 +225,7 @@ void find_hidden_sets(const CertifiedRegions& regions, ViewCells& cells, const P
 
   // The squares above the pieces, from the largest down.
   std::vector<Node> above = {{0, {}}};
-  std::vector<Piece> pieces = {{{0, 0, side}, 0, std::move(all), {}}};
+  std::vector<Piece> pieces = {{{0, 0, side}, 0, 0, std::move(all), {}}};
   for (; side > kPieceColumns; side /= 2) {
     std::vector<Piece> quarters;
     for (Piece& piece : pieces) {
@@ -175,6 +233,7 @@ void find_hidden_sets(const CertifiedRegions& regions, ViewCells& cells, const P
       if (top == -HUGE_VAL) continue;
       std::vector<GroupIndex> hidden = finder.take_hidden(piece.square, top, piece.open);
       if (!hidden.empty()) {
+        piece.held += hidden.size();
         above.push_back({piece.parent, std::move(hidden)});
         piece.parent = static_cast<std::uint32_t>(above.size() - 1);
       }
@@ -182,7 +241,7 @@ void find_hidden_sets(const CertifiedRegions& regions, ViewCells& cells, const P
         for (const std::int32_t right : {0, side / 2}) {
           const Square quarter{piece.square.column + right, piece.square.row + down, side / 2};
           if (quarter.column < cells.columns && quarter.row < cells.rows)
-            quarters.push_back({quarter, piece.parent, piece.open, {}});
+            quarters.push_back({quarter, piece.parent, piece.held, piece.open, {}});
         }
     }
     pieces = std::move(quarters);
@@ -194,7 +253,7 @@ void find_hidden_sets(const CertifiedRegions& regions, ViewCells& cells, const P
   parallel_for(pieces.size(), [&](std::size_t i) {
     Piece& piece = pieces[i];
     piece.nodes = {{0, {}}};  // stands for the parent
-    finder.divide(piece.square, 0, std::move(piece.open), piece.nodes, node_of_cell);
+    finder.divide(piece.square, 0, piece.held, std::move(piece.open), piece.nodes, node_of_cell);
     if (!progress) return;
     const std::lock_guard lock(telling);
     progress(static_cast<double>(++done) / static_cast<double>(pieces.size()));
@@ -209,14 +268,8 @@ void find_hidden_sets(const CertifiedRegions& regions, ViewCells& cells, const P
     std::vector<std::uint32_t> number = {number_above[piece.parent]};
     for (std::size_t n = 1; n < piece.nodes.size(); ++n)
       number.push_back(numbering.number(number[piece.nodes[n].parent], piece.nodes[n].added));
-    const Square& square = piece.square;
-    for (std::int32_t row = square.row; row < std::min(square.row + square.side, cells.rows); ++row)
-      for (std::int32_t column = square.column;
-           column < std::min(square.column + square.side, cells.columns); ++column)
-        for (std::int32_t band = 0; band < cells.bands; ++band) {
-          const std::size_t cell = cells.at(column, row, band);
-          if (!std::isnan(cells.top_m[cell])) cells.set[cell] = number[node_of_cell[cell]];
-        }
+    finder.for_each_cell(piece.square,
+                         [&](std::size_t cell) { cells.set[cell] = number[node_of_cell[cell]]; });
   }
 }
 

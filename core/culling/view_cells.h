@@ -44,11 +44,14 @@ struct ViewCells {
 /// Fills cells.set and cells.sets with the groups that are hidden from all of each cell.
 ///
 /// Method: a quadtree over the columns; groups hidden from all of a square are not looked at in its
-/// quarters, those hidden from a band not in the bands below.
+/// quarters, those hidden from a band not in the bands below. Where a square's own set, or that of
+/// the band above, has nearly all that its cells have, it stands for theirs.
+/// @param keep  share of the members of cells' sets that must be left for that, in [0, 1]; 1 leaves
+///              nothing out
 /// Side: as hides_group_from: what is in a set is hidden from everywhere in its cell.
 /// Requires proper places and tops. The same bits for any number of threads.
 /// Cost: one test for each cell and group that is not hidden from a larger one.
-void find_hidden_sets(const CertifiedRegions& regions, ViewCells& cells,
+void find_hidden_sets(const CertifiedRegions& regions, double keep, ViewCells& cells,
                       const Progress& progress = {});
 
 }  // namespace scarp

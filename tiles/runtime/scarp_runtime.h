@@ -41,10 +41,23 @@
 #error "scarp_runtime.h needs IEEE arithmetic: compile without -ffast-math or /fp:fast"
 #endif
 
+#include <cfloat>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+
+#if FLT_EVAL_METHOD != 0
+#error "scarp_runtime.h needs doubles that are doubles: compile for SSE2 (-msse2 -mfpmath=sse)"
+#endif
+
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(SCARP_RUNTIME_NO_AVX2)
+#define SCARP_RUNTIME_AVX2 1  // found out at run time
+#include <immintrin.h>
+#endif
 
 #if !defined(SCARP_RUNTIME_NO_FILES) && (defined(__unix__) || defined(__APPLE__))
 #define SCARP_RUNTIME_FILES 1
@@ -160,7 +173,7 @@ inline double dot(const double* a, const double* b) {
 inline double floor_of(double value) {
   return std::floor(value);
 }
-/// Of numbers from 0 to 2^31: the same, and runs side by side.
+/// The same of numbers from 0 to 2^31.
 inline double cut(double value) {
   return static_cast<double>(static_cast<std::int32_t>(value));
 }
@@ -330,11 +343,27 @@ class Culling {
   Aim aim_at(const Camera& camera, const Tile& tile) const;
   Look look_at(const Aim& aim, std::uint32_t group) const;
   std::uint32_t ring_of(double ratio) const;
-  std::int64_t slope_of(std::uint32_t group, std::uint32_t sector, std::uint32_t ring,
-                        bool* is_known) const;
-  static bool is_under(const Aim& aim, double height, double distance, double slope);
+  static std::int32_t last_step_of(std::uint32_t ring) {
+    return static_cast<std::int32_t>(ring << detail::kSlopeBits | (detail::kSlopeCodes - 1));
+  }
+  static std::uint32_t code_at(const std::uint16_t* steps, std::int32_t last);
+  std::uint32_t code_of(std::uint32_t group, const Look& look) const {
+    return code_at(steps_ + (std::size_t{group} * sectors_ + look.sector) * 4,
+                   last_step_of(look.ring));
+  }
+  std::int64_t slope_of(std::uint32_t group, std::uint32_t code) const;
+  static double safe_distance(double distance, double slope);
   void hidden_block(const Aim& aim, std::uint32_t first, std::uint32_t count,
                     unsigned char* hidden) const;
+#if defined(__SSE2__)
+  void look_at_two(const Aim& aim, std::uint32_t group, double* distances, double* rises,
+                   std::int32_t* sectors, std::int32_t* lasts) const;
+#endif
+#if defined(SCARP_RUNTIME_AVX2)
+  void look_at_four(const Aim& aim, std::uint32_t group, double* distances, double* rises,
+                    std::int32_t* sectors, std::int32_t* lasts) const;
+  bool has_avx2_ = __builtin_cpu_supports("avx2");
+#endif
   static bool is_outside(const Camera& camera, const Frustum& frustum, const std::int32_t* box);
   std::uint32_t show(const Camera& camera, const Frustum* frustum, std::uint32_t first,
                      std::uint32_t count, const unsigned char* hidden,
@@ -727,22 +756,25 @@ inline Culling::Look Culling::look_at(const Aim& aim, std::uint32_t group) const
   return look;
 }
 
-/// The slope under which the group is hidden, 2^-20, of the last step that is not beyond the ring.
-inline std::int64_t Culling::slope_of(std::uint32_t group, std::uint32_t sector, std::uint32_t ring,
-                                      bool* is_known) const {
-  const std::uint16_t* steps = steps_ + (std::size_t{group} * sectors_ + sector) * 4;
-  const std::uint32_t last = (ring << detail::kSlopeBits) | (detail::kSlopeCodes - 1);
-  std::uint32_t code = 0;
-  for (int i = 0; i < 4; ++i) code = steps[i] <= last ? steps[i] : code;
-  code &= detail::kSlopeCodes - 1;
-  *is_known = code != 0;
-  const std::uint64_t more = code != 0 ? (std::uint64_t{code - 1} * step_[group]) >> 10 : 0;
-  return low_[group] + static_cast<std::int64_t>(more);
+/// The code of the last of a sector's steps that is not beyond, 0 for none. Without branches, which
+/// would be guessed wrong half of the time; rings rise from step to step.
+inline std::uint32_t Culling::code_at(const std::uint16_t* steps, std::int32_t last) {
+  const int count =
+      int(steps[0] <= last) + int(steps[1] <= last) + int(steps[2] <= last) + int(steps[3] <= last);
+  const int has_step = int(count > 0);
+  return (steps[count - has_step] & (detail::kSlopeCodes - 1)) * std::uint32_t(has_step);
 }
 
-inline bool Culling::is_under(const Aim& aim, double height, double distance, double slope) {
-  const double safe = slope >= 0 ? distance - 3 : distance + 4;
-  return (aim.z - height) * detail::kSlopeOne < slope * safe * aim.units;
+/// The slope of a code, 2^-20; of code 0 that of code 1.
+inline std::int64_t Culling::slope_of(std::uint32_t group, std::uint32_t code) const {
+  return low_[group] + static_cast<std::int64_t>(
+                           (std::uint64_t{code - std::uint32_t(code != 0)} * step_[group]) >> 10);
+}
+
+/// Farther where the line falls, nearer where it rises.
+inline double Culling::safe_distance(double distance, double slope) {
+  constexpr double kAside[] = {-3, 4};
+  return distance + kAside[slope < 0];
 }
 
 inline bool Culling::hides(const Camera& camera, std::uint32_t group) const {
@@ -754,63 +786,184 @@ inline bool Culling::hides(const Camera& camera, std::uint32_t group) const {
       continue;
     const Aim aim = aim_at(camera, tile);
     const Look look = look_at(aim, group);
-    if (look.is_near) return false;
-    bool is_known;
-    const double slope = double(slope_of(group, look.sector, look.ring, &is_known));
-    return is_known && is_under(aim, height_[group], look.distance, slope);
+    const std::uint32_t code = look.is_near ? 0 : code_of(group, look);
+    const double slope = double(slope_of(group, code));
+    return code != 0 && (aim.z - height_[group]) * detail::kSlopeOne <
+                            slope * safe_distance(look.distance, slope) * aim.units;
   }
   return false;
 }
 
-/// The same as hides() for up to 64 groups of a tile, in loops that run side by side.
+/// The same as hides() for up to 64 groups of a tile: first where the camera stands for all of
+/// them, so that look-ups overlap.
 inline void Culling::hidden_block(const Aim& aim, std::uint32_t first, std::uint32_t count,
                                   unsigned char* hidden) const {
-  using detail::cut;
-  double far_x[64], far_y[64], distance[64], ratio[64], sector[64];
-  const std::int32_t *group_x = x_ + first, *group_y = y_ + first;
-  const float* inverse = inverse_ + first;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const double dx = aim.x - group_x[i], dy = aim.y - group_y[i];
-    const double x = cut(detail::least(std::fabs(dx) * aim.parts, detail::kMostParts));
-    const double y = cut(detail::least(std::fabs(dy) * aim.parts, detail::kMostParts));
-    far_x[i] = x, far_y[i] = y;
-    distance[i] = cut(std::sqrt(x * x + y * y));
+  double distance[64], rise[64];
+  std::int32_t sector[64], last[64];
+  std::uint32_t done = 0;
+#if defined(SCARP_RUNTIME_AVX2)
+  if (has_avx2_)
+    for (; done + 4 <= count; done += 4)
+      look_at_four(aim, first + done, distance + done, rise + done, sector + done, last + done);
+#endif
+#if defined(__SSE2__)
+  for (; done + 2 <= count; done += 2)
+    look_at_two(aim, first + done, distance + done, rise + done, sector + done, last + done);
+#endif
+  for (; done < count; ++done) {
+    const Look look = look_at(aim, first + done);
+    distance[done] = look.distance;
+    rise[done] = (aim.z - height_[first + done]) * (detail::kSlopeOne * aim.parts);
+    sector[done] = static_cast<std::int32_t>(look.sector);
+    last[done] = look.is_near ? -1 : last_step_of(look.ring);
   }
+  const std::uint16_t* steps[64];
+  const std::size_t row = std::size_t{sectors_} * 4;
+  const std::uint16_t* const first_row = steps_ + std::size_t{first} * row;
   for (std::uint32_t i = 0; i < count; ++i) {
-    double r = distance[i] * aim.units * double(inverse[i]);
-    r = r < detail::kMostRatio ? r : detail::kMostRatio;
-    ratio[i] = cut(r > 0 ? r : 0);
-  }
-  const double sectors_an_eighth = double(sectors_ / 8) * (1.0 / 131072.0);
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const double dx = aim.x - group_x[i], dy = aim.y - group_y[i], x = far_x[i], y = far_y[i];
-    const double tangent =
-        cut(detail::least(x, y) * detail::kTangentOne / detail::most(detail::most(x, y), 1));
-    const double eighth =
-        cut(tangent * (detail::kSectorA * detail::kTangentOne - detail::kSectorB * tangent) *
-            (1.0 / 17179869184.0));
-    const double quarter = y > x ? 2 * detail::kTangentOne - eighth : eighth;
-    const double half = dx < 0 ? 4 * detail::kTangentOne - quarter : quarter;
-    const double turn = dy < 0 ? 8 * detail::kTangentOne - half : half;
-    const double at = cut(turn * sectors_an_eighth);
-    sector[i] = at < double(sectors_) ? at : 0;
-  }
-  std::uint32_t sectors[64];
-  for (std::uint32_t i = 0; i < count; ++i) {
-    sectors[i] = static_cast<std::uint32_t>(sector[i]);
+    steps[i] = first_row + (i * row + std::size_t(sector[i]) * 4);
 #if defined(__GNUC__)
-    __builtin_prefetch(steps_ + (std::size_t{first + i} * sectors_ + sectors[i]) * 4);
+    __builtin_prefetch(steps[i]);
 #endif
   }
   for (std::uint32_t i = 0; i < count; ++i) {
-    const bool is_near = !(distance[i] >= detail::kLeastParts && ratio[i] >= detail::kRatioOne);
-    bool is_known;
-    const double slope =
-        double(slope_of(first + i, sectors[i], is_near ? 0 : ring_of(ratio[i]), &is_known));
+    const std::uint32_t code = code_at(steps[i], last[i]);
+    const double slope = double(slope_of(first + i, code));
     hidden[i] = static_cast<unsigned char>(
-        int(!is_near) & int(is_known) & int(is_under(aim, height_[first + i], distance[i], slope)));
+        int(code != 0) & int(rise[i] < slope * safe_distance(distance[i], slope)));
   }
 }
+
+#if defined(__SSE2__)
+/// look_at() for two groups side by side: the same operations one for one.
+inline void Culling::look_at_two(const Aim& aim, std::uint32_t group, double* distances,
+                                 double* rises, std::int32_t* sectors, std::int32_t* lasts) const {
+  const auto all = [](double value) { return _mm_set1_pd(value); };
+  const auto cut = [](__m128d v) { return _mm_cvtepi32_pd(_mm_cvttpd_epi32(v)); };
+  const auto pick = [](__m128d mask, __m128d yes, __m128d no) {
+    return _mm_or_pd(_mm_and_pd(mask, yes), _mm_andnot_pd(mask, no));
+  };
+  const auto whole = [](const std::int32_t* at) {
+    return _mm_cvtepi32_pd(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(at)));
+  };
+  const __m128d zero = _mm_setzero_pd(), sign = all(-0.0), one = all(detail::kTangentOne);
+  const __m128d dx = _mm_sub_pd(all(aim.x), whole(x_ + group));
+  const __m128d dy = _mm_sub_pd(all(aim.y), whole(y_ + group));
+  const __m128d parts = all(aim.parts), most = all(detail::kMostParts);
+  const __m128d x = cut(_mm_min_pd(_mm_mul_pd(_mm_andnot_pd(sign, dx), parts), most));
+  const __m128d y = cut(_mm_min_pd(_mm_mul_pd(_mm_andnot_pd(sign, dy), parts), most));
+  const __m128d distance = cut(_mm_sqrt_pd(_mm_add_pd(_mm_mul_pd(x, x), _mm_mul_pd(y, y))));
+  const __m128d inverse = _mm_cvtps_pd(
+      _mm_castsi128_ps(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(inverse_ + group))));
+  const __m128d ratio =
+      cut(_mm_max_pd(_mm_min_pd(_mm_mul_pd(_mm_mul_pd(distance, all(aim.units)), inverse),
+                                all(detail::kMostRatio)),
+                     zero));
+  const __m128d tangent =
+      cut(_mm_div_pd(_mm_mul_pd(_mm_min_pd(x, y), one), _mm_max_pd(_mm_max_pd(x, y), all(1))));
+  const __m128d slope = _mm_sub_pd(all(detail::kSectorA * detail::kTangentOne),
+                                   _mm_mul_pd(all(detail::kSectorB), tangent));
+  const __m128d eighth = cut(_mm_mul_pd(_mm_mul_pd(tangent, slope), all(1.0 / 17179869184.0)));
+  const __m128d quarter =
+      pick(_mm_cmpgt_pd(y, x), _mm_sub_pd(all(2 * detail::kTangentOne), eighth), eighth);
+  const __m128d half =
+      pick(_mm_cmplt_pd(dx, zero), _mm_sub_pd(all(4 * detail::kTangentOne), quarter), quarter);
+  const __m128d turn =
+      pick(_mm_cmplt_pd(dy, zero), _mm_sub_pd(all(8 * detail::kTangentOne), half), half);
+  const __m128i sector = _mm_cvttpd_epi32(_mm_mul_pd(turn, all((sectors_ / 8) * (1.0 / 131072.0))));
+  const __m128i is_within = _mm_cmplt_epi32(sector, _mm_set1_epi32(int(sectors_)));
+  _mm_storel_epi64(reinterpret_cast<__m128i*>(sectors), _mm_and_si128(sector, is_within));
+  _mm_storeu_pd(distances, distance);
+  _mm_storeu_pd(rises, _mm_mul_pd(_mm_sub_pd(all(aim.z), whole(height_ + group)),
+                                  all(detail::kSlopeOne * aim.parts)));
+  // As ring_of and last_step_of, in 64 bits each: the high halves are zero.
+  const __m128i bits = _mm_srl_epi64(_mm_castpd_si128(_mm_mul_pd(ratio, ratio)),
+                                     _mm_cvtsi32_si128(int(52 - ring_bits_)));
+  const __m128i ring = _mm_sub_epi32(bits, _mm_set1_epi32(int((1023U + 32U) << ring_bits_)));
+  const __m128i farthest = _mm_set1_epi32(63), is_last = _mm_cmpgt_epi32(ring, farthest);
+  const __m128i limited =
+      _mm_or_si128(_mm_and_si128(is_last, farthest), _mm_andnot_si128(is_last, ring));
+  const __m128i last =
+      _mm_or_si128(_mm_slli_epi32(limited, 10), _mm_set1_epi32(detail::kSlopeCodes - 1));
+  const __m128d is_far = _mm_and_pd(_mm_cmpge_pd(distance, all(detail::kLeastParts)),
+                                    _mm_cmpge_pd(ratio, all(detail::kRatioOne)));
+  // Nearer ones get -1: no step counts.
+  const __m128i kept =
+      _mm_or_si128(last, _mm_andnot_si128(_mm_castpd_si128(is_far), _mm_set1_epi32(-1)));
+  _mm_storel_epi64(reinterpret_cast<__m128i*>(lasts),
+                   _mm_shuffle_epi32(kept, _MM_SHUFFLE(3, 1, 2, 0)));
+}
+#endif
+
+#if defined(SCARP_RUNTIME_AVX2)
+/// The same for four, where the machine has AVX2.
+__attribute__((target("avx2"))) inline void Culling::look_at_four(const Aim& aim,
+                                                                  std::uint32_t group,
+                                                                  double* distances, double* rises,
+                                                                  std::int32_t* sectors,
+                                                                  std::int32_t* lasts) const {
+#define SCARP_ALL(value) _mm256_set1_pd(value)
+#define SCARP_CUT(v) _mm256_cvtepi32_pd(_mm256_cvttpd_epi32(v))
+#define SCARP_WHOLE(at) _mm256_cvtepi32_pd(_mm_loadu_si128(reinterpret_cast<const __m128i*>(at)))
+  const __m256d zero = _mm256_setzero_pd(), sign = SCARP_ALL(-0.0);
+  const __m256d dx = _mm256_sub_pd(SCARP_ALL(aim.x), SCARP_WHOLE(x_ + group));
+  const __m256d dy = _mm256_sub_pd(SCARP_ALL(aim.y), SCARP_WHOLE(y_ + group));
+  const __m256d parts = SCARP_ALL(aim.parts), most = SCARP_ALL(detail::kMostParts);
+  const __m256d x =
+      SCARP_CUT(_mm256_min_pd(_mm256_mul_pd(_mm256_andnot_pd(sign, dx), parts), most));
+  const __m256d y =
+      SCARP_CUT(_mm256_min_pd(_mm256_mul_pd(_mm256_andnot_pd(sign, dy), parts), most));
+  const __m256d distance =
+      SCARP_CUT(_mm256_sqrt_pd(_mm256_add_pd(_mm256_mul_pd(x, x), _mm256_mul_pd(y, y))));
+  const __m256d inverse = _mm256_cvtps_pd(_mm_loadu_ps(inverse_ + group));
+  const __m256d ratio = SCARP_CUT(_mm256_max_pd(
+      _mm256_min_pd(_mm256_mul_pd(_mm256_mul_pd(distance, SCARP_ALL(aim.units)), inverse),
+                    SCARP_ALL(detail::kMostRatio)),
+      zero));
+  const __m256d tangent =
+      SCARP_CUT(_mm256_div_pd(_mm256_mul_pd(_mm256_min_pd(x, y), SCARP_ALL(detail::kTangentOne)),
+                              _mm256_max_pd(_mm256_max_pd(x, y), SCARP_ALL(1))));
+  const __m256d slope = _mm256_sub_pd(SCARP_ALL(detail::kSectorA * detail::kTangentOne),
+                                      _mm256_mul_pd(SCARP_ALL(detail::kSectorB), tangent));
+  const __m256d eighth =
+      SCARP_CUT(_mm256_mul_pd(_mm256_mul_pd(tangent, slope), SCARP_ALL(1.0 / 17179869184.0)));
+  const __m256d quarter =
+      _mm256_blendv_pd(eighth, _mm256_sub_pd(SCARP_ALL(2 * detail::kTangentOne), eighth),
+                       _mm256_cmp_pd(y, x, _CMP_GT_OQ));
+  const __m256d half =
+      _mm256_blendv_pd(quarter, _mm256_sub_pd(SCARP_ALL(4 * detail::kTangentOne), quarter),
+                       _mm256_cmp_pd(dx, zero, _CMP_LT_OQ));
+  const __m256d turn =
+      _mm256_blendv_pd(half, _mm256_sub_pd(SCARP_ALL(8 * detail::kTangentOne), half),
+                       _mm256_cmp_pd(dy, zero, _CMP_LT_OQ));
+  const __m128i sector =
+      _mm256_cvttpd_epi32(_mm256_mul_pd(turn, SCARP_ALL((sectors_ / 8) * (1.0 / 131072.0))));
+  const __m128i is_within = _mm_cmplt_epi32(sector, _mm_set1_epi32(int(sectors_)));
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(sectors), _mm_and_si128(sector, is_within));
+  _mm256_storeu_pd(distances, distance);
+  _mm256_storeu_pd(rises,
+                   _mm256_mul_pd(_mm256_sub_pd(SCARP_ALL(aim.z), SCARP_WHOLE(height_ + group)),
+                                 SCARP_ALL(detail::kSlopeOne * aim.parts)));
+  const __m256i low_halves = _mm256_setr_epi32(0, 2, 4, 6, 0, 2, 4, 6);
+  const __m256i bits = _mm256_srl_epi64(_mm256_castpd_si256(_mm256_mul_pd(ratio, ratio)),
+                                        _mm_cvtsi32_si128(int(52 - ring_bits_)));
+  const __m256d is_far =
+      _mm256_and_pd(_mm256_cmp_pd(distance, SCARP_ALL(detail::kLeastParts), _CMP_GE_OQ),
+                    _mm256_cmp_pd(ratio, SCARP_ALL(detail::kRatioOne), _CMP_GE_OQ));
+  const __m128i ring =
+      _mm_sub_epi32(_mm256_castsi256_si128(_mm256_permutevar8x32_epi32(bits, low_halves)),
+                    _mm_set1_epi32(int((1023U + 32U) << ring_bits_)));
+  const __m128i is_kept =
+      _mm256_castsi256_si128(_mm256_permutevar8x32_epi32(_mm256_castpd_si256(is_far), low_halves));
+  const __m128i last = _mm_or_si128(_mm_slli_epi32(_mm_min_epi32(ring, _mm_set1_epi32(63)), 10),
+                                    _mm_set1_epi32(detail::kSlopeCodes - 1));
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(lasts),
+                   _mm_or_si128(last, _mm_andnot_si128(is_kept, _mm_set1_epi32(-1))));
+#undef SCARP_ALL
+#undef SCARP_CUT
+#undef SCARP_WHOLE
+}
+#endif
 
 /// Writes those of up to 64 groups that are not hidden and may be in the frustum.
 inline std::uint32_t Culling::show(const Camera& camera, const Frustum* frustum,
@@ -1024,14 +1177,13 @@ inline double MovingView::look_again(const Culling::Aim& aim, std::uint32_t grou
     const double end = look.ring == 63 ? square * 1.125 : octave * (1 + (place + 1) / rings);
     const double ratio = detail::least(square - begin, end - square - 1) / (2.125 * look.ratio);
     free = detail::least(free, ((ratio - 1) / a_part - 3) / 1.5);
-    bool is_known;
-    const double slope = double(c.slope_of(group, look.sector, look.ring, &is_known));
-    if (is_known) {
-      *is_hidden = Culling::is_under(aim, c.height_[group], look.distance, slope);
-      const double safe = slope >= 0 ? look.distance - 3 : look.distance + 4;
-      const double gap =
-          std::fabs((aim.z - c.height_[group]) * detail::kSlopeOne - slope * safe * aim.units) /
-          aim.units;
+    const std::uint32_t code = c.code_of(group, look);
+    if (code != 0) {
+      const double slope = double(c.slope_of(group, code));
+      const double rise = (aim.z - c.height_[group]) * detail::kSlopeOne;
+      const double line = slope * Culling::safe_distance(look.distance, slope) * aim.units;
+      *is_hidden = rise < line;
+      const double gap = std::fabs(rise - line) / aim.units;
       const double steep = std::fabs(slope);
       free = detail::least(free, (gap - 3 * steep) / (detail::kSlopeOne + 1.5 * steep) - 1);
     }

@@ -46,7 +46,7 @@ const test::CullingScene& hills() {
 const ViewCells& filled() {
   static const ViewCells cells = [] {
     ViewCells made = cells_over(hills());
-    find_hidden_sets(hills().groups.certified, made);
+    find_hidden_sets(hills().groups.certified, 1, made);
     return made;
   }();
   return cells;
@@ -104,11 +104,27 @@ TEST(ViewCells, SetsGrowDownwardsAndAreAllDifferent) {
 TEST(ViewCells, AreTheSameForAnyNumberOfThreads) {
   ViewCells one = cells_over(hills());
   set_thread_count(1);
-  find_hidden_sets(hills().groups.certified, one);
+  find_hidden_sets(hills().groups.certified, 1, one);
   set_thread_count(0);
   EXPECT_EQ(one.set, filled().set);
   EXPECT_EQ(one.sets.parent, filled().sets.parent);
   EXPECT_EQ(one.sets.added, filled().sets.added);
+}
+
+/// Cells share sets of larger ones, and each keeps the share that was asked for on average.
+TEST(ViewCells, ShareSetsThatHoldNearlyAll) {
+  ViewCells shared = cells_over(hills());
+  find_hidden_sets(hills().groups.certified, 0.8, shared);
+  std::size_t kept = 0, all = 0;
+  for (std::size_t cell = 0; cell < shared.set.size(); ++cell) {
+    if (std::isnan(shared.top_m[cell])) continue;
+    const auto fewer = groups_of(shared.sets, shared.set[cell]);
+    const auto more = groups_of(filled().sets, filled().set[cell]);
+    ASSERT_TRUE(std::includes(more.begin(), more.end(), fewer.begin(), fewer.end()));
+    kept += fewer.size(), all += more.size();
+  }
+  EXPECT_GT(static_cast<double>(kept), 0.8 * static_cast<double>(all));
+  EXPECT_LT(shared.sets.size(), filled().sets.size() * 3 / 4);
 }
 
 TEST(SetsFile, ReadsBackWhatWasWritten) {
