@@ -10,9 +10,23 @@
 #include "cli/outputs.h"
 #include "cli/scene_tiles.h"
 #include "cli/stages.h"
+#include "core/error/error.h"
 
 namespace scarp {
 namespace {
+
+/// Throws Error{kUsage} for an option that the format has no use for.
+void check_used(const ExportOptions& options) {
+  const auto refuse = [&](const char* option, const char* format) {
+    throw Error(ErrorCode::kUsage, fmt::format("{} is for --to {}, and --to {} was given; leave it "
+                                               "out",
+                                               option, format, options.to));
+  };
+  const bool is_vdb = options.to == "vdb";
+  if (options.observer && !is_vdb) refuse("--observer", "vdb");
+  if (!options.altitudes_m.empty() && !is_vdb) refuse("--altitudes", "vdb");
+  if (options.cell_m && !is_vdb) refuse("--cell", "vdb");
+}
 
 constexpr std::array kExporters = {
     Exporter{"groups", "what a simulator culls groups by", "groups.scarp", export_groups},
@@ -32,6 +46,7 @@ const Exporter* find_exporter(std::string_view name) {
 }
 
 int run_export(const ExportOptions& options) {
+  check_used(options);
   const Exporter& exporter = *find_exporter(options.to);
   SceneTiles scene(options.scene);
   PartFolder folder(options.output, exporter.mark, existing(options.common));
