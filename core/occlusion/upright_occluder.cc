@@ -1,0 +1,126 @@
+#include "core/occlusion/upright_occluder.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <utility>
+
+#include "core/geodesy/predicates.h"
+
+namespace scarp {
+namespace {
+
+/// The upper corners: from them, and to them, lines run highest.
+std::array<Position, 4> upper_corners(const Bounds& box) {
+  const auto& [low, high] = box;
+  return {{{low.x_m, low.y_m, high.z_m},
+           {high.x_m, low.y_m, high.z_m},
+           {high.x_m, high.y_m, high.z_m},
+           {low.x_m, high.y_m, high.z_m}}};
+}
+
+/// The side of a line in the plane that all of a box is strictly on, 0 where there is none.
+int side_of(const Position& a, const Position& b, const Bounds& box) {
+  int side = 0;
+  for (const Position& corner : upper_corners(box)) {
+    const int here = orient2d(a, b, corner);
+    if (here == 0 || here == -side) return 0;
+    side = here;
+  }
+  return side;
+}
+
+/// Least and greatest side of a place against the lines from one box to another.
+std::pair<int, int> sides_against_lines(const Bounds& eyes, const Bounds& targets,
+                                        const Position& place) {
+  std::pair<int, int> sides{1, -1};
+  for (const Position& eye : upper_corners(eyes))
+    for (const Position& target : upper_corners(targets)) {
+      const int side = orient2d(eye, target, place);
+      sides = {std::min(sides.first, side), std::max(sides.second, side)};
+    }
+  return sides;
+}
+
+}  // namespace
+
+UprightOccluder::UprightOccluder(std::vector<Position> top) : top_(std::move(top)) {
+  assert(top_.size() >= 2);
+  highest_m_ = std::max_element(top_.begin(), top_.end(), [](const Position& a, const Position& b) {
+                 return a.z_m < b.z_m;
+               })->z_m;
+  terms_.push_back({});
+  grow(0, 0, static_cast<std::uint32_t>(top_.size() - 1), true);
+}
+
+void UprightOccluder::grow(std::uint32_t term, std::uint32_t from, std::uint32_t to,
+                           bool is_upper) {
+  // The hull of the polyline on one side; places on its edges stay corners.
+  std::vector<std::uint32_t> hull;
+  const int inner = is_upper ? -1 : 1;
+  for (std::uint32_t p = from; p <= to; ++p) {
+    while (hull.size() >= 2 &&
+           above_line(top_[hull[hull.size() - 2]], top_[p], top_[hull.back()]) == inner)
+      hull.pop_back();
+    hull.push_back(p);
+  }
+  const auto first = static_cast<std::uint32_t>(terms_.size());
+  const auto count = static_cast<std::uint32_t>(hull.size() - 1);
+  terms_[term] = {is_upper ? Term::kAll : Term::kAny, first, count};
+  terms_.resize(first + count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (hull[i + 1] == hull[i] + 1)
+      terms_[first + i] = {Term::kEdge, hull[i], 1};
+    else
+      grow(first + i, hull[i], hull[i + 1], !is_upper);
+  }
+}
+
+bool UprightOccluder::holds(const Term& term, int eye_side, const Bounds& eyes,
+                            const Bounds& targets) const {
+  if (term.kind != Term::kEdge) {
+    const bool is_any = term.kind == Term::kAny;
+    for (std::uint32_t i = term.first; i < term.first + term.count; ++i)
+      if (holds(terms_[i], eye_side, eyes, targets) == is_any) return is_any;
+    return !is_any;
+  }
+  const Position &a = top_[term.first], &b = top_[term.first + 1];
+  for (const Position& eye : upper_corners(eyes))
+    for (const Position& target : upper_corners(targets))
+      if (orient3d(a, b, eye, target) * eye_side > 0) return false;
+  return true;
+}
+
+FullOcclusion UprightOccluder::judge(const Bounds& eyes, const Bounds& targets) const {
+  if (eyes.low.z_m > highest_m_ && targets.low.z_m > highest_m_) return FullOcclusion::kNever;
+  const Position &from = top_.front(), &to = top_.back();
+  const int eye_side = side_of(from, to, eyes);
+  if (eye_side == 0) return FullOcclusion::kNever;
+  const int target_side = side_of(from, to, targets);
+  if (target_side == eye_side) return FullOcclusion::kNever;
+  // Looking across from the left of from -> to, `to` is on the left and `from` on the right.
+  const auto at_to = sides_against_lines(eyes, targets, to);
+  const auto at_from = sides_against_lines(eyes, targets, from);
+  const bool all_beyond_to = eye_side > 0 ? at_to.second < 0 : at_to.first > 0;
+  const bool all_beyond_from = eye_side > 0 ? at_from.first > 0 : at_from.second < 0;
+  if (all_beyond_to || all_beyond_from) return FullOcclusion::kNever;
+  if (target_side == 0) return FullOcclusion::kOpen;
+  const bool within_to = eye_side > 0 ? at_to.first >= 0 : at_to.second <= 0;
+  const bool within_from = eye_side > 0 ? at_from.second <= 0 : at_from.first >= 0;
+  if (!within_to || !within_from) return FullOcclusion::kOpen;
+  return holds(terms_[0], eye_side, eyes, targets) ? FullOcclusion::kHidden : FullOcclusion::kOpen;
+}
+
+std::string UprightOccluder::text_of(std::uint32_t index) const {
+  const Term& term = terms_[index];
+  if (term.kind == Term::kEdge) return "F" + std::to_string(term.first);
+  std::string text;
+  for (std::uint32_t i = term.first; i < term.first + term.count; ++i) {
+    if (!text.empty()) text += term.kind == Term::kAll ? " & " : " | ";
+    const bool is_joined = terms_[i].kind != Term::kEdge && terms_[i].count > 1;
+    text += is_joined ? "(" + text_of(i) + ")" : text_of(i);
+  }
+  return text;
+}
+
+}  // namespace scarp
