@@ -17,10 +17,13 @@
 #include "cli/scene_culling.h"
 #include "core/culling/box_tree.h"
 #include "core/culling/cell_culling.h"
+#include "core/culling/certified_hiding.h"
 #include "core/culling/image_culling.h"
 #include "core/culling/mask_culling.h"
+#include "core/culling/occluder_hiding.h"
 #include "core/culling/query_culling.h"
 #include "core/error/error.h"
+#include "core/occlusion/virtual_occluders.h"
 #include "tiles/layers/png_image.h"
 #include "tiles/store/part_folder.h"
 
@@ -65,19 +68,11 @@ struct Prepared {
   }
 };
 
-/// Where cells are made: the ground and what is above it, as far as the highest is above the
-/// lowest.
-Bounds airspace(const Tin& tin) {
-  Bounds space = bounds_of(tin.vertices);
-  space.high.z_m += std::max(1.0, space.high.z_m - space.low.z_m);
-  return space;
-}
-
-/// Cells are divided down to a quarter of the mean group's radius.
-double least_cell_m(const CertifiedRegions& regions) {
-  double sum_m = 0;
-  for (const CertifiedGroup& group : regions.groups) sum_m += static_cast<double>(group.radius_m);
-  return sum_m / static_cast<double>(regions.groups.size()) / 4;
+/// Cells of view, the smallest an eighth as wide as the mean group is.
+std::vector<CellSpace> cells_of_view(const LoadedScene& scene) {
+  const Bounds ground = bounds_of(scene.tin.vertices);
+  const double area_m2 = (ground.high.x_m - ground.low.x_m) * (ground.high.y_m - ground.low.y_m);
+  return walk_and_flight(ground, std::sqrt(area_m2 / std::max(1U, scene.groups.leaf_count)) / 8);
 }
 
 std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& prepared,
@@ -100,11 +95,18 @@ std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& p
   add("hzb", true, 0, 0, [&] { return std::make_unique<HzbCulling>(scene.tin, batches); });
   add("mask", false, 0, 0,
       [&] { return std::make_unique<MaskCulling>(scene.tin, batches, prepared.tree); });
+  const auto add_cells = [&](const char* label, auto hiding) {
+    add(label, true, 0, 0,
+        [&] { return std::make_unique<CellCulling>(label, hiding(), cells_of_view(scene)); });
+  };
   if (scene.groups.has_certified())
-    add("cells", true, 0, 0, [&] {
-      return std::make_unique<CellCulling>(scene.groups.certified, airspace(scene.tin),
-                                           least_cell_m(scene.groups.certified));
+    add_cells("cells", [&] {
+      return std::make_unique<CertifiedHiding>(prepared.tree, scene.groups.certified);
     });
+  add_cells("law-tan", [&] {
+    return std::make_unique<OccluderHiding>(prepared.tree,
+                                            find_virtual_occluders(scene.tin, {}).sections);
+  });
   ImageCullingOptions hom;
   add("hom", false, 0, 0, [&] { return std::make_unique<HomCulling>(batches, hom); });
   hom.opacity = kSmallGapOpacity;

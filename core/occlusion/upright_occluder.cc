@@ -117,7 +117,7 @@ std::string UprightOccluder::text_of(std::uint32_t index) const {
   std::string text;
   for (std::uint32_t i = term.first; i < term.first + term.count; ++i) {
     if (!text.empty()) text += term.kind == Term::kAll ? " & " : " | ";
-    const bool is_joined = terms_[i].kind != Term::kEdge && terms_[i].count > 1;
+    const bool is_joined = terms_[i].kind != Term::kEdge && term.count > 1;
     text += is_joined ? "(" + text_of(i) + ")" : text_of(i);
   }
   return text;

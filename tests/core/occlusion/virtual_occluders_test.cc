@@ -94,8 +94,8 @@ TEST(VirtualOccluders, ALineOverTheGroundOrOverVoidIsNotUnderIt) {
   const TinIndex index(whole);
   EXPECT_TRUE(is_under_ground(index, {{10, 35, 9}, {70, 35, 9}}));
   EXPECT_FALSE(is_under_ground(index, {{10, 35, 9}, {70, 35, 10}}));
-  EXPECT_TRUE(is_under_ground(index, {{10, 35, 9}, {40, 35, 19}, {70, 35, 9}}));
-  EXPECT_FALSE(is_under_ground(index, {{10, 35, 9}, {45, 35, 19}, {70, 35, 9}}));
+  EXPECT_TRUE(is_under_ground(index, {{30, 35, 9}, {40, 35, 19}, {50, 35, 9}}));
+  EXPECT_FALSE(is_under_ground(index, {{10, 35, 9}, {40, 35, 19}, {70, 35, 9}}));
   EXPECT_FALSE(is_under_ground(index, {{10, 35, 9}, {90, 35, 9}})) << "ends outside";
   grid.known[grid.index(4, 4)] = 0;
   const Tin holed = test::triangulated(grid);
