@@ -72,7 +72,7 @@ struct Prepared {
 std::vector<CellSpace> cells_of_view(const LoadedScene& scene) {
   const Bounds ground = bounds_of(scene.tin.vertices);
   const double area_m2 = (ground.high.x_m - ground.low.x_m) * (ground.high.y_m - ground.low.y_m);
-  return walk_and_flight(ground, std::sqrt(area_m2 / std::max(1U, scene.groups.leaf_count)) / 8);
+  return walk_and_flight(scene.tin, std::sqrt(area_m2 / std::max(1U, scene.groups.leaf_count)) / 8);
 }
 
 std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& prepared,
@@ -104,7 +104,7 @@ std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& p
       return std::make_unique<CertifiedHiding>(prepared.tree, scene.groups.certified);
     });
   add_cells("law-tan", [&] {
-    return std::make_unique<OccluderHiding>(prepared.tree,
+    return std::make_unique<OccluderHiding>(prepared.tree, batches, scene.tin,
                                             find_virtual_occluders(scene.tin, {}).sections);
   });
   ImageCullingOptions hom;

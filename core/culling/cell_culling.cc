@@ -23,24 +23,6 @@ Position middle_of(const Bounds& box) {
                                    (box.low.z_m + box.high.z_m) / 2});
 }
 
-bool meet_in_plane(const Bounds& a, const Bounds& b) {
-  return a.low.x_m <= b.high.x_m && b.low.x_m <= a.high.x_m && a.low.y_m <= b.high.y_m &&
-         b.low.y_m <= a.high.y_m;
-}
-
-/// Lowers and raises a box to the groups that are over it in the plane, which hold all its ground.
-void fit_to_ground(const BoxTree& tree, NodeIndex index, Bounds& box, Bounds& fitted) {
-  const BoxTree::Node& node = tree.nodes()[index];
-  if (!meet_in_plane(node.box, box)) return;
-  if (node.is_leaf()) {
-    fitted.low.z_m = std::min(fitted.low.z_m, node.box.low.z_m);
-    fitted.high.z_m = std::max(fitted.high.z_m, node.box.high.z_m);
-    return;
-  }
-  fit_to_ground(tree, node.left, box, fitted);
-  fit_to_ground(tree, node.right, box, fitted);
-}
-
 }  // namespace
 
 CellTree::CellTree(const NodeHiding& hiding, const CellSpace& space)
@@ -64,16 +46,16 @@ Bounds CellTree::part_of(const Bounds& box, unsigned child) const {
   };
   halve(1, &Position::x_m);
   halve(2, &Position::y_m);
-  if (space_.shape == CellShape::kFlight) {
+  if (!space_.ground) {
     halve(4, &Position::z_m);
     return part;
   }
-  Bounds fitted = part;
-  std::swap(fitted.low.z_m, fitted.high.z_m);
-  if (!hiding_.tree().nodes().empty()) fit_to_ground(hiding_.tree(), 0, part, fitted);
-  if (fitted.low.z_m > fitted.high.z_m) return part;  // no ground
-  part.low.z_m = std::max(part.low.z_m, fitted.low.z_m);
-  part.high.z_m = std::min(part.high.z_m, fitted.high.z_m + space_.air_m);
+  // Heights only choose the cell: an eye is in it where its box holds it.
+  if (const auto heights_m = space_.ground->over(part)) {
+    part.low.z_m = std::max(part.low.z_m, round_to_lattice((*heights_m)[0] - kLatticeStepM));
+    part.high.z_m =
+        std::min(part.high.z_m, round_to_lattice((*heights_m)[1] + space_.air_m + kLatticeStepM));
+  }
   return part;
 }
 
@@ -163,12 +145,13 @@ std::uint64_t CellCulling::bytes() const {
   return bytes;
 }
 
-std::vector<CellSpace> walk_and_flight(const Bounds& ground, double least_m) {
-  Bounds walk = ground, flight = ground;
+std::vector<CellSpace> walk_and_flight(const Tin& ground, double least_m) {
+  const Bounds bounds = bounds_of(ground.vertices);
+  Bounds walk = bounds, flight = bounds;
   walk.high.z_m += kWalkingAirM;
-  flight.high.z_m += std::max(1.0, std::ceil(ground.high.z_m - ground.low.z_m));
-  return {{CellShape::kGround, walk, least_m, kWalkingAirM},
-          {CellShape::kFlight, flight, least_m, 0}};
+  flight.high.z_m += std::max(1.0, std::ceil(bounds.high.z_m - bounds.low.z_m));
+  return {{walk, least_m, std::make_shared<GroundHeights>(ground), kWalkingAirM},
+          {flight, least_m}};
 }
 
 }  // namespace scarp

@@ -5,22 +5,19 @@
 #include <vector>
 
 #include "core/culling/culling_method.h"
+#include "core/culling/ground_heights.h"
 #include "core/culling/joint_walk.h"
 #include "core/culling/node_hiding.h"
 
 namespace scarp {
 
-/// How space is divided into cells.
-enum class CellShape : std::uint8_t {
-  kGround,  ///< a quadtree of squares of ground, and the air over it up to where eyes go
-  kFlight,  ///< an octree
-};
-
+/// Where eyes may be, and how that is divided.
 struct CellSpace {
-  CellShape shape;
-  Bounds box;        ///< of all eyes
-  double least_m;    ///< cells are not divided below this width
-  double air_m = 0;  ///< kGround: height of eyes above the highest ground of a cell
+  Bounds box;
+  double least_m;  ///< cells are not divided below this width
+  /// Where given, a quadtree of squares of this ground and the air over it; otherwise an octree.
+  std::shared_ptr<const GroundHeights> ground = nullptr;
+  double air_m = 0;  ///< height of eyes above the highest ground of a square
 };
 
 /// A tree of view cells, each with the nodes that are hidden from all of it: those of its parent
@@ -53,7 +50,7 @@ class CellTree {
     std::uint32_t first_child;  // kNone where it was not divided
   };
 
-  unsigned children() const { return space_.shape == CellShape::kGround ? 4 : 8; }
+  unsigned children() const { return space_.ground ? 4 : 8; }
   Bounds part_of(const Bounds& box, unsigned child) const;
   void divide(std::uint32_t cell);
   void collect(std::uint32_t cell, std::vector<NodeIndex>& hidden) const;
@@ -92,8 +89,8 @@ class CellCulling : public CullingMethod {
 };
 
 /// Cells over the ground up to 10 m above it, and in the air from there to as far above the highest
-/// place as that is above the lowest.
+/// place as that is above the lowest. They keep a reference to the ground.
 /// @param least_m  width of the smallest cells
-std::vector<CellSpace> walk_and_flight(const Bounds& ground, double least_m);
+std::vector<CellSpace> walk_and_flight(const Tin& ground, double least_m);
 
 }  // namespace scarp

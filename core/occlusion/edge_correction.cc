@@ -56,7 +56,7 @@ double error_m(const TinIndex& surface, const Position& a, const Position& b, co
     const MeshEdge& edge = surface.edges()[e];
     const Position &p = surface.tin().vertices[edge.from], &q = surface.tin().vertices[edge.to];
     const double p_side = dot(across, p - a), q_side = dot(across, q - a);
-    if ((p_side > 0) == (q_side > 0) || p_side == q_side) return false;
+    if (p_side * q_side > 0 || p_side == q_side) return false;
     const Position cut = moved(p, q - p, p_side / (p_side - q_side));
     const double share = dot(cut - a, along) / length2;
     if (share > 0 && share < 1) error = std::max(error, -dot(cut - a, normal));

@@ -19,10 +19,10 @@ std::array<Position, 4> upper_corners(const Bounds& box) {
            {low.x_m, high.y_m, high.z_m}}};
 }
 
-/// The side of a line in the plane that all of a box is strictly on, 0 where there is none.
-int side_of(const Position& a, const Position& b, const Bounds& box) {
+/// The side of a line in the plane that all places are strictly on, 0 where there is none.
+int side_of(const Position& a, const Position& b, std::span<const Position> places) {
   int side = 0;
-  for (const Position& corner : upper_corners(box)) {
+  for (const Position& corner : places) {
     const int here = orient2d(a, b, corner);
     if (here == 0 || here == -side) return 0;
     side = here;
@@ -30,12 +30,12 @@ int side_of(const Position& a, const Position& b, const Bounds& box) {
   return side;
 }
 
-/// Least and greatest side of a place against the lines from one box to another.
-std::pair<int, int> sides_against_lines(const Bounds& eyes, const Bounds& targets,
-                                        const Position& place) {
+/// Least and greatest side of a place against the lines from eyes to targets.
+std::pair<int, int> sides_against_lines(std::span<const Position> eyes,
+                                        std::span<const Position> targets, const Position& place) {
   std::pair<int, int> sides{1, -1};
-  for (const Position& eye : upper_corners(eyes))
-    for (const Position& target : upper_corners(targets)) {
+  for (const Position& eye : eyes)
+    for (const Position& target : targets) {
       const int side = orient2d(eye, target, place);
       sides = {std::min(sides.first, side), std::max(sides.second, side)};
     }
@@ -76,8 +76,8 @@ void UprightOccluder::grow(std::uint32_t term, std::uint32_t from, std::uint32_t
   }
 }
 
-bool UprightOccluder::holds(const Term& term, int eye_side, const Bounds& eyes,
-                            const Bounds& targets) const {
+bool UprightOccluder::holds(const Term& term, int eye_side, std::span<const Position> eyes,
+                            std::span<const Position> targets) const {
   if (term.kind != Term::kEdge) {
     const bool is_any = term.kind == Term::kAny;
     for (std::uint32_t i = term.first; i < term.first + term.count; ++i)
@@ -85,14 +85,26 @@ bool UprightOccluder::holds(const Term& term, int eye_side, const Bounds& eyes,
     return !is_any;
   }
   const Position &a = top_[term.first], &b = top_[term.first + 1];
-  for (const Position& eye : upper_corners(eyes))
-    for (const Position& target : upper_corners(targets))
+  for (const Position& eye : eyes)
+    for (const Position& target : targets)
       if (orient3d(a, b, eye, target) * eye_side > 0) return false;
   return true;
 }
 
 FullOcclusion UprightOccluder::judge(const Bounds& eyes, const Bounds& targets) const {
-  if (eyes.low.z_m > highest_m_ && targets.low.z_m > highest_m_) return FullOcclusion::kNever;
+  return judge(eyes, upper_corners(targets), targets.low.z_m);
+}
+
+FullOcclusion UprightOccluder::judge(const Bounds& eyes, std::span<const Position> targets) const {
+  double lowest_m = targets.front().z_m;
+  for (const Position& target : targets) lowest_m = std::min(lowest_m, target.z_m);
+  return judge(eyes, targets, lowest_m);
+}
+
+FullOcclusion UprightOccluder::judge(const Bounds& eye_box, std::span<const Position> targets,
+                                     double lowest_m) const {
+  if (eye_box.low.z_m > highest_m_ && lowest_m > highest_m_) return FullOcclusion::kNever;
+  const std::array<Position, 4> eyes = upper_corners(eye_box);
   const Position &from = top_.front(), &to = top_.back();
   const int eye_side = side_of(from, to, eyes);
   if (eye_side == 0) return FullOcclusion::kNever;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,9 @@ class UprightOccluder {
   /// Requires lattice boxes. Cost: 16 exact signs an edge, about 0.2 us.
   FullOcclusion judge(const Bounds& eyes, const Bounds& targets) const;
 
+  /// The same for the convex hull of some lattice places, such as a triangle's corners.
+  FullOcclusion judge(const Bounds& eyes, std::span<const Position> targets) const;
+
   const std::vector<Position>& top() const { return top_; }
 
   /// "F0 & (F1 | F2)": the expression over the edges of the polyline, for people and tests.
@@ -49,7 +53,9 @@ class UprightOccluder {
   };
 
   void grow(std::uint32_t term, std::uint32_t from, std::uint32_t to, bool is_upper);
-  bool holds(const Term& term, int eye_side, const Bounds& eyes, const Bounds& targets) const;
+  FullOcclusion judge(const Bounds& eyes, std::span<const Position> targets, double lowest_m) const;
+  bool holds(const Term& term, int eye_side, std::span<const Position> eyes,
+             std::span<const Position> targets) const;
   std::string text_of(std::uint32_t term) const;
 
   std::vector<Position> top_;

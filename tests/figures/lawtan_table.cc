@@ -1,5 +1,5 @@
 // Repeats the experiment of Law and Tan 1999 for docs/lawtan.md.
-//   lawtan_table towers COUNT WIDTH_M HEIGHT_M     round buildings over such ground, as GeoJSON
+//   lawtan_table towers COUNT WIDTH_M HEIGHT_M     round buildings over such ground, as CSV
 //   lawtan_table walk SCENE LEVELS FRAMES [CSV]    a row of each table: occluders, cells, a drive
 //   lawtan_table correction SCENE                  how often edge error correction hides what is
 //   seen lawtan_table views SCENE FRAME SVG             the refined surface from above, without and
@@ -50,22 +50,19 @@ double seconds_of(const std::function<void()>& work) {
 void print_towers(int count, double width_m, double height_m) {
   SplitMix64 random(kSeed);
   const auto unit = [&] { return static_cast<double>(random.below(1U << 24)) / (1U << 24); };
-  fmt::print("{{\"type\":\"FeatureCollection\",\"features\":[\n");
+  fmt::print("WKT,height\n");
   for (int i = 0; i < count; ++i) {
     const double radius_m = width_m * (0.006 + 0.012 * unit());
     const double x_m = width_m * (0.05 + 0.9 * unit()), y_m = height_m * (0.05 + 0.9 * unit());
-    fmt::print(
-        "{}{{\"type\":\"Feature\",\"properties\":{{\"height\":{:.1f}}},"
-        "\"geometry\":{{\"type\":\"Polygon\",\"coordinates\":[[",
-        i > 0 ? ",\n" : "", radius_m * (0.5 + unit()));
+    const double roof_m = radius_m * (0.5 + unit());
+    fmt::print("\"POLYGON((");
     for (int k = 0; k <= kTowerCorners; ++k) {
       const double turn_rad = 2 * std::numbers::pi * (k % kTowerCorners) / kTowerCorners;
-      fmt::print("{}[{:.2f},{:.2f}]", k > 0 ? "," : "", x_m + radius_m * std::cos(turn_rad),
+      fmt::print("{}{:.2f} {:.2f}", k > 0 ? "," : "", x_m + radius_m * std::cos(turn_rad),
                  y_m + radius_m * std::sin(turn_rad));
     }
-    fmt::print("]]}}}}");
+    fmt::print("))\",{:.1f}\n", roof_m);
   }
-  fmt::print("\n]}}\n");
 }
 
 /// A scene and what is found in it before the walk.
@@ -86,7 +83,7 @@ struct Walk {
   std::vector<CellSpace> ground_cells(int levels) const {
     const Bounds ground = bounds_of(scene.tin.vertices);
     const double width_m = ground.high.x_m - ground.low.x_m;
-    return {walk_and_flight(ground, width_m / std::exp2(levels - 1)).front()};
+    return {walk_and_flight(scene.tin, width_m / std::exp2(levels - 1)).front()};
   }
 };
 
@@ -182,8 +179,9 @@ void print_walk(const std::string& path, int levels, int count, const std::strin
                levels, prepare_s, static_cast<double>(cells->bytes()) / 1000);
     return cells;
   };
-  const auto law_tan = cells_of("virtual occluders",
-                                std::make_unique<OccluderHiding>(scene.tree, occluders.sections));
+  const auto law_tan = cells_of(
+      "virtual occluders",
+      std::make_unique<OccluderHiding>(scene.tree, scene.batches, tin, occluders.sections));
   std::unique_ptr<CellCulling> certified;
   if (scene.scene.groups.has_certified())
     certified = cells_of("certified regions", std::make_unique<CertifiedHiding>(
@@ -218,6 +216,53 @@ void print_walk(const std::string& path, int levels, int count, const std::strin
                         by_occluders.triangles[f], by_certified ? by_certified->triangles[f] : NAN,
                         whole.frame_ms[f], by_occluders.frame_ms[f],
                         by_certified ? by_certified->frame_ms[f] : NAN);
+}
+
+/// A line a method, over the frames, of columns `first` on.
+std::string curves(const std::vector<std::vector<double>>& rows, std::size_t first, double top_px,
+                   const char* title) {
+  constexpr double kLeftPx = 60, kWidePx = 760, kHighPx = 180;
+  constexpr const char* kColours[] = {kSoftColour, "#c8102e", "#0b6fb8"};
+  double most = 0;
+  for (const auto& row : rows)
+    for (std::size_t i = 0; i < 3; ++i) most = std::max(most, row[first + i]);
+  std::string out = svg_text(kLeftPx, top_px - 8, "start", kInkColour, 13, title);
+  const double step = round_step(most, 4);
+  for (double tick = 0; tick <= most; tick += step) {
+    const double y_px = top_px + kHighPx * (1 - tick / most);
+    out += fmt::format("<line x1=\"{}\" x2=\"{}\" y1=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"{}\"/>\n",
+                       kLeftPx, kLeftPx + kWidePx, y_px, y_px, kFaintColour);
+    out += svg_text(kLeftPx - 6, y_px + 4, "end", kSoftColour, 11, fmt::format("{:g}", tick));
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    out += fmt::format("<polyline fill=\"none\" stroke=\"{}\" points=\"", kColours[i]);
+    for (std::size_t f = 0; f < rows.size(); ++f)
+      out += fmt::format(
+          "{:.1f},{:.1f} ",
+          kLeftPx + kWidePx * static_cast<double>(f) / static_cast<double>(rows.size() - 1),
+          top_px + kHighPx * (1 - rows[f][first + i] / most));
+    out += "\"/>\n";
+  }
+  return out;
+}
+
+void write_curves(const std::string& csv, const std::string& svg) {
+  std::ifstream file(csv);
+  std::string line;
+  std::getline(file, line);
+  std::vector<std::vector<double>> rows;
+  while (std::getline(file, line)) {
+    std::vector<double>& row = rows.emplace_back();
+    for (std::size_t at = 0; at < line.size(); at = line.find(',', at), at += at < line.size())
+      row.push_back(std::strtod(line.c_str() + at, nullptr));
+  }
+  std::string out = svg_begin(840, 500);
+  out += curves(rows, 1, 40, "Triangles a frame, refined to 1 px");
+  out += curves(rows, 4, 265, "Time of a frame, ms");
+  out += svg_text(60, 480, "start", kSoftColour, 13, "without culling");
+  out += svg_text(200, 480, "start", "#c8102e", 13, "cells, virtual occluders");
+  out += svg_text(400, 480, "start", "#0b6fb8", 13, "cells, certified regions");
+  std::ofstream(svg) << out << "</svg>\n";
 }
 
 void print_correction(const std::string& path) {
@@ -321,6 +366,8 @@ int main(int argc, char** argv) {
     scarp::print_walk(argv[2], std::atoi(argv[3]), std::atoi(argv[4]), argc == 6 ? argv[5] : "");
   else if (what == "correction" && argc == 3)
     scarp::print_correction(argv[2]);
+  else if (what == "curves" && argc == 4)
+    scarp::write_curves(argv[2], argv[3]);
   else if (what == "views" && argc == 5)
     scarp::write_views(argv[2], static_cast<std::size_t>(std::atoi(argv[3])), argv[4]);
   else

@@ -151,7 +151,8 @@ TEST(JointWalk, TakesAnyActiveListToTheLeavesThatAreNotHidden) {
 
 TEST(OccluderHiding, WhatIsHiddenFromABoxIsSeenByNoEyeInIt) {
   const Scene& scene = hills();
-  const OccluderHiding hiding(scene.tree, find_virtual_occluders(scene.ground.tin, {}).sections);
+  const OccluderHiding hiding(scene.tree, scene.batches, scene.ground.tin,
+                              find_virtual_occluders(scene.ground.tin, {}).sections);
   Draw draw(5);
   std::uint64_t hidden = 0, inner = 0;
   for (int i = 0; i < 60; ++i) {
@@ -179,6 +180,31 @@ TEST(OccluderHiding, WhatIsHiddenFromABoxIsSeenByNoEyeInIt) {
   EXPECT_GT(inner, 50U) << "whole nodes are found";
 }
 
+TEST(GroundHeights, AreThoseOfTheGroundInTheRectangle) {
+  const Scene& scene = hills();
+  const GroundHeights heights(scene.ground.tin);
+  Draw draw(6);
+  for (int i = 0; i < 100; ++i) {
+    Bounds square{draw.in({{0, 0, 0}, {300, 300, 0}}, false), {}};
+    square.high = {square.low.x_m + 4 + 40 * draw.unit(), square.low.y_m + 4 + 40 * draw.unit(), 0};
+    const auto range_m = heights.over(square);
+    ASSERT_TRUE(range_m);
+    double least_m = 1e9, greatest_m = -1e9;
+    for (int k = 0; k < 400; ++k) {
+      const Position p = draw.in(square, k < 8);
+      const auto z_m = scene.index.ground_height_m(p.x_m, p.y_m);
+      if (!z_m) continue;
+      least_m = std::min(least_m, *z_m);
+      greatest_m = std::max(greatest_m, *z_m);
+    }
+    EXPECT_LE((*range_m)[0], least_m + 1e-2);
+    EXPECT_GE((*range_m)[1], greatest_m - 1e-2);
+    EXPECT_NEAR((*range_m)[0], least_m, 10) << "and no more than that";
+    EXPECT_NEAR((*range_m)[1], greatest_m, 10);
+  }
+  EXPECT_FALSE(heights.over({{900, 900, 0}, {910, 910, 0}}));
+}
+
 /// Eyes of walkers and of flights, in one order for all.
 std::vector<Position> eyes_over(const Tin& tin, int count) {
   Draw draw(2);
@@ -194,10 +220,9 @@ std::vector<Position> eyes_over(const Tin& tin, int count) {
 TEST(CellCulling, NeverLeavesOutWhatCertifiedShowsAndComesCloseToIt) {
   const Scene& scene = hills();
   CertifiedCulling certified(scene.regions);
-  const Bounds ground = bounds_of(scene.ground.tin.vertices);
   const auto cells = [&](double least_m) {
     return CellCulling("cells", std::make_unique<CertifiedHiding>(scene.tree, scene.regions),
-                       walk_and_flight(ground, least_m));
+                       walk_and_flight(scene.ground.tin, least_m));
   };
   CellCulling coarse = cells(100), fine = cells(6);
   std::size_t by_certified = 0, by_fine = 0, by_coarse = 0, all = 0;
@@ -219,12 +244,11 @@ TEST(CellCulling, NeverLeavesOutWhatCertifiedShowsAndComesCloseToIt) {
 TEST(CellCulling, SetsOfParentAndChildrenAreWhatIsFoundForTheCellAlone) {
   const Scene& scene = hills();
   const CertifiedHiding hiding(scene.tree, scene.regions);
-  const Bounds ground = bounds_of(scene.ground.tin.vertices);
-  for (const CellSpace& space : walk_and_flight(ground, 40)) {
+  for (const CellSpace& space : walk_and_flight(scene.ground.tin, 40)) {
     CellTree cells(hiding, space);
     cells.divide_all();
     const std::size_t size = cells.size();
-    EXPECT_EQ(size % (space.shape == CellShape::kGround ? 4 : 8), 1U);
+    EXPECT_EQ(size % (space.ground ? 4 : 8), 1U);
     for (const Position& eye : eyes_over(scene.ground.tin, 20)) {
       std::vector<NodeIndex> hidden;
       const std::uint32_t cell = cells.hidden_from(eye, hidden);
@@ -239,10 +263,11 @@ TEST(CellCulling, SetsOfParentAndChildrenAreWhatIsFoundForTheCellAlone) {
 
 TEST(CellCulling, WithVirtualOccludersHidesNothingThatIsSeen) {
   const Scene& scene = hills();
-  CellCulling cells("law-tan",
-                    std::make_unique<OccluderHiding>(
-                        scene.tree, find_virtual_occluders(scene.ground.tin, {}).sections),
-                    walk_and_flight(bounds_of(scene.ground.tin.vertices), 6));
+  CellCulling cells(
+      "law-tan",
+      std::make_unique<OccluderHiding>(scene.tree, scene.batches, scene.ground.tin,
+                                       find_virtual_occluders(scene.ground.tin, {}).sections),
+      walk_and_flight(scene.ground.tin, 6));
   std::uint64_t hidden = 0;
   for (const Position& eye : eyes_over(scene.ground.tin, 20)) {
     const CullingAnswer answer = cells.visible({eye, {}});
@@ -263,7 +288,7 @@ TEST(CellCulling, WithVirtualOccludersHidesNothingThatIsSeen) {
 TEST(CellCulling, SeesEverythingFromOutsideItsSpace) {
   const Scene& scene = hills();
   CellCulling cells("cells", std::make_unique<CertifiedHiding>(scene.tree, scene.regions),
-                    {{CellShape::kFlight, {{0, 0, 0}, {100, 100, 100}}, 10}});
+                    {{{{0, 0, 0}, {100, 100, 100}}, 10}});
   EXPECT_EQ(cells.visible({{500, 0, 0}, {}}).visible_groups.size(), scene.regions.groups.size());
   EXPECT_EQ(cells.trees()[0].size(), 1U);
 }
