@@ -19,6 +19,7 @@
 #include "core/culling/cell_culling.h"
 #include "core/culling/certified_hiding.h"
 #include "core/culling/image_culling.h"
+#include "core/culling/joint_hiding.h"
 #include "core/culling/mask_culling.h"
 #include "core/culling/occluder_hiding.h"
 #include "core/culling/query_culling.h"
@@ -95,18 +96,19 @@ std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& p
   add("hzb", true, 0, 0, [&] { return std::make_unique<HzbCulling>(scene.tin, batches); });
   add("mask", false, 0, 0,
       [&] { return std::make_unique<MaskCulling>(scene.tin, batches, prepared.tree); });
-  const auto add_cells = [&](const char* label, auto hiding) {
-    add(label, true, 0, 0,
-        [&] { return std::make_unique<CellCulling>(label, hiding(), cells_of_view(scene)); });
-  };
-  if (scene.groups.has_certified())
-    add_cells("cells", [&] {
-      return std::make_unique<CertifiedHiding>(prepared.tree, scene.groups.certified);
-    });
-  add_cells("law-tan", [&] {
+  const auto by_occluders = [&] {
     return std::make_unique<OccluderHiding>(prepared.tree, batches, scene.tin,
                                             find_virtual_occluders(scene.tin, {}).sections);
-  });
+  };
+  const auto cells = [&](const char* label, std::unique_ptr<NodeHiding> hiding) {
+    return std::make_unique<CellCulling>(label, std::move(hiding), cells_of_view(scene));
+  };
+  if (scene.groups.has_certified())
+    add("cells", true, 0, 0, [&] {
+      auto by_regions = std::make_unique<CertifiedHiding>(prepared.tree, scene.groups.certified);
+      return cells("cells", std::make_unique<JointHiding>(std::move(by_regions), by_occluders()));
+    });
+  add("law-tan", true, 0, 0, [&] { return cells("law-tan", by_occluders()); });
   ImageCullingOptions hom;
   add("hom", false, 0, 0, [&] { return std::make_unique<HomCulling>(batches, hom); });
   hom.opacity = kSmallGapOpacity;

@@ -77,10 +77,7 @@ void CellTree::collect(std::uint32_t cell, std::vector<NodeIndex>& hidden) const
     hidden.insert(hidden.end(), cells_[at].hidden.begin(), cells_[at].hidden.end());
   std::sort(hidden.begin(), hidden.end());
   // A cell may hide a whole node of which a cell above hid a part.
-  std::size_t kept = 0;
-  for (const NodeIndex node : hidden)
-    if (kept == 0 || node > hiding_.tree().last_below(hidden[kept - 1])) hidden[kept++] = node;
-  hidden.resize(kept);
+  keep_highest(hiding_.tree(), hidden);
 }
 
 std::uint32_t CellTree::hidden_from(const Position& eye, std::vector<NodeIndex>& hidden) {

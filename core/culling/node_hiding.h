@@ -8,6 +8,14 @@
 
 namespace scarp {
 
+/// Leaves only those nodes of an ascending list that are not below another of it.
+inline void keep_highest(const BoxTree& tree, std::vector<NodeIndex>& nodes) {
+  std::size_t kept = 0;
+  for (const NodeIndex node : nodes)
+    if (kept == 0 || node > tree.last_below(nodes[kept - 1])) nodes[kept++] = node;
+  nodes.resize(kept);
+}
+
 /// What tells which nodes of a tree are hidden from all of a box of eyes.
 class NodeHiding {
  public:

@@ -12,6 +12,12 @@ namespace {
 /// millisecond.
 constexpr double kMostBinsASide = 512;
 
+/// Bins are taken a little larger than they are: far more than rounding.
+constexpr double kBeyondBin = 1 + 0x1p-20;
+
+/// Bins that are looked at one by one; where more are seen, the triangle is.
+constexpr std::uint32_t kMostBinsLookedAt = 64;
+
 /// What a picture shows of triangles that may be off by some metres up or down.
 class ScreenError {
  public:
@@ -62,7 +68,7 @@ class ScreenError {
 }  // namespace
 
 SelectiveRefinement::SelectiveRefinement(const Tin& tin, const Groups& groups)
-    : tin_(tin), history_(collapse_edges(tin, {})) {
+    : tin_(tin), groups_(groups), history_(collapse_edges(tin, {})) {
   error_m_.assign(history_.triangles.size(), 0);
   made_by_.assign(history_.triangles.size(), kNone);
   for (std::uint32_t c = 0; c < history_.collapses.size(); ++c) {
@@ -73,7 +79,7 @@ SelectiveRefinement::SelectiveRefinement(const Tin& tin, const Groups& groups)
       made_by_[t] = c;
     }
   }
-  lay_out_bins(groups);
+  lay_out_bins();
 }
 
 SelectiveRefinement::BinRange SelectiveRefinement::bins_of(
@@ -94,7 +100,21 @@ SelectiveRefinement::BinRange SelectiveRefinement::bins_of(
   return {columns[0], columns[1], rows[0], rows[1]};
 }
 
-void SelectiveRefinement::lay_out_bins(const Groups& groups) {
+/// Whether a triangle may meet a bin: no edge has all of the bin on its outer side.
+bool SelectiveRefinement::touches(const std::array<VertexIndex, 3>& triangle, std::uint32_t column,
+                                  std::uint32_t row) const {
+  const double half_m = bin_m_ / 2, x_m = low_x_m_ + (column + 0.5) * bin_m_,
+               y_m = low_y_m_ + (row + 0.5) * bin_m_;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Position &a = tin_.vertices[triangle[i]], &b = tin_.vertices[triangle[(i + 1) % 3]];
+    const double dx_m = b.x_m - a.x_m, dy_m = b.y_m - a.y_m;
+    const double reach_m2 = (std::abs(dx_m) + std::abs(dy_m)) * half_m * kBeyondBin;
+    if (dx_m * (y_m - a.y_m) - dy_m * (x_m - a.x_m) < -reach_m2) return false;
+  }
+  return true;
+}
+
+void SelectiveRefinement::lay_out_bins() {
   const Bounds bounds = bounds_of(tin_.vertices);
   low_x_m_ = bounds.low.x_m;
   low_y_m_ = bounds.low.y_m;
@@ -103,13 +123,14 @@ void SelectiveRefinement::lay_out_bins(const Groups& groups) {
   columns_ = static_cast<std::uint32_t>(width_m / bin_m_) + 1;
   rows_ = static_cast<std::uint32_t>(height_m / bin_m_) + 1;
 
-  std::vector<std::vector<std::uint32_t>> bins(groups.leaf_count + 1);
+  std::vector<std::vector<std::uint32_t>> bins(groups_.leaf_count + 1);
   for (TriangleIndex t = 0; t < history_.original_triangles; ++t) {
-    const GroupIndex group = groups.group_of_triangle[t];
+    const GroupIndex group = groups_.group_of_triangle[t];
     const BinRange range = bins_of(history_.triangles[t]);
     for (std::uint32_t row = range.first_row; row <= range.last_row; ++row)
       for (std::uint32_t column = range.first_column; column <= range.last_column; ++column)
-        bins[group == kNone ? groups.leaf_count : group].push_back(row * columns_ + column);
+        if (touches(history_.triangles[t], column, row))
+          bins[group == kNone ? groups_.leaf_count : group].push_back(row * columns_ + column);
   }
   first_bin_.push_back(0);
   for (std::vector<std::uint32_t>& of_group : bins) {
@@ -120,42 +141,49 @@ void SelectiveRefinement::lay_out_bins(const Groups& groups) {
   }
 }
 
-/// How many bins with ground that may be seen lie before a bin in both directions:
-/// [rows + 1][columns + 1], so that those of a rectangle are four look-ups.
-std::vector<std::uint32_t> SelectiveRefinement::count_seen(
+SelectiveRefinement::SeenGround SelectiveRefinement::seen_ground(
     std::span<const GroupIndex> visible_groups) const {
-  const std::size_t stride = columns_ + 1;
-  std::vector<std::uint32_t> count(stride * (rows_ + 1), 0);
+  SeenGround seen;
+  seen.groups.assign(groups_.leaf_count, 0);
+  seen.stride = columns_ + 1;
+  std::vector<std::uint32_t>& count = seen.bins_before;
+  count.assign(seen.stride * (rows_ + 1), 0);
   const auto mark = [&](std::size_t group) {
     for (std::uint32_t i = first_bin_[group]; i < first_bin_[group + 1]; ++i) {
       const std::uint32_t row = group_bins_[i] / columns_, column = group_bins_[i] % columns_;
-      count[(row + 1) * stride + column + 1] = 1;
+      count[(row + 1) * seen.stride + column + 1] = 1;
     }
   };
-  for (const GroupIndex group : visible_groups) mark(group);
-  mark(first_bin_.size() - 2);
+  for (const GroupIndex group : visible_groups) {
+    seen.groups[group] = 1;
+    mark(group);
+  }
+  mark(groups_.leaf_count);
   for (std::size_t row = 1; row <= rows_; ++row) {
     std::uint32_t in_row = 0;
-    for (std::size_t column = 1; column < stride; ++column) {
-      in_row += count[row * stride + column];
-      count[row * stride + column] = count[(row - 1) * stride + column] + in_row;
+    for (std::size_t column = 1; column < seen.stride; ++column) {
+      in_row += count[row * seen.stride + column];
+      count[row * seen.stride + column] = count[(row - 1) * seen.stride + column] + in_row;
     }
   }
-  return count;
+  return seen;
 }
 
-bool SelectiveRefinement::is_over_seen(std::span<const std::uint32_t> seen,
-                                       TriangleIndex triangle) const {
-  if (seen.empty()) return true;
-  const std::size_t stride = columns_ + 1;
-  const BinRange bins = bins_of(history_.triangles[triangle]);
-  const auto before = [&](std::size_t row, std::size_t column) {
-    return seen[row * stride + column];
-  };
-  return before(bins.last_row + 1, bins.last_column + 1) +
-             before(bins.first_row, bins.first_column) !=
-         before(bins.first_row, bins.last_column + 1) +
-             before(bins.last_row + 1, bins.first_column);
+bool SelectiveRefinement::is_over_seen(const SeenGround& seen, TriangleIndex t) const {
+  if (seen.bins_before.empty()) return true;
+  if (t < history_.original_triangles) {
+    const GroupIndex group = groups_.group_of_triangle[t];
+    return group == kNone || seen.groups[group];
+  }
+  const BinRange range = bins_of(history_.triangles[t]);
+  const std::uint32_t seen_bins = seen.bins_in(range);
+  if (seen_bins == 0 || seen_bins > kMostBinsLookedAt) return seen_bins > 0;
+  for (std::uint32_t row = range.first_row; row <= range.last_row; ++row)
+    for (std::uint32_t column = range.first_column; column <= range.last_column; ++column)
+      if (seen.bins_in({column, column, row, row}) > 0 &&
+          touches(history_.triangles[t], column, row))
+        return true;
+  return false;
 }
 
 SelectiveRefinement::Drawing SelectiveRefinement::draw(
@@ -163,8 +191,7 @@ SelectiveRefinement::Drawing SelectiveRefinement::draw(
     std::optional<std::span<const GroupIndex>> visible_groups) const {
   const ScreenError screen(shot);
   const std::vector<ClipPosition> places = project_all(screen.projection(), tin_.vertices);
-  const std::vector<std::uint32_t> seen =
-      visible_groups ? count_seen(*visible_groups) : std::vector<std::uint32_t>();
+  const SeenGround seen = visible_groups ? seen_ground(*visible_groups) : SeenGround();
   const auto is_too_coarse = [&](TriangleIndex t) {
     const auto& triangle = history_.triangles[t];
     const double error_m = static_cast<double>(error_m_[t]);

@@ -21,7 +21,7 @@ namespace scarp {
 /// silhouette that was moved by the allowed error can let one look into them.
 ///
 /// Side: errors are bounds of the vertical gap, seen from the nearest corner.
-/// Keeps a reference to the surface. Cost: the collapses, once; O(collapses) a picture.
+/// Keeps references. Cost: the collapses, once; O(collapses) a picture.
 /// Source: Law and Tan 1999, 6, after Hoppe 1997; collapses that rest on each other as in the
 ///   multi-triangulations of De Floriani, Magillo and Puppo 1997.
 class SelectiveRefinement {
@@ -49,12 +49,34 @@ class SelectiveRefinement {
     std::uint32_t first_column, last_column, first_row, last_row;
   };
 
-  void lay_out_bins(const Groups& groups);
+  /// What a picture's groups are in the plane; nothing where all is seen.
+  struct SeenGround {
+    std::vector<std::uint8_t> groups;
+    /// How many bins that they touch lie before a bin in both directions: [rows + 1][columns + 1],
+    /// so that those in a rectangle are four look-ups.
+    std::vector<std::uint32_t> bins_before;
+    std::size_t stride = 0;
+
+    std::uint32_t bins_in(const BinRange& range) const {
+      const auto before = [&](std::size_t row, std::size_t column) {
+        return bins_before[row * stride + column];
+      };
+      return before(range.last_row + 1, range.last_column + 1) -
+             before(range.first_row, range.last_column + 1) -
+             before(range.last_row + 1, range.first_column) +
+             before(range.first_row, range.first_column);
+    }
+  };
+
+  void lay_out_bins();
   BinRange bins_of(const std::array<VertexIndex, 3>& triangle) const;
-  std::vector<std::uint32_t> count_seen(std::span<const GroupIndex> visible_groups) const;
-  bool is_over_seen(std::span<const std::uint32_t> seen, TriangleIndex triangle) const;
+  SeenGround seen_ground(std::span<const GroupIndex> visible_groups) const;
+  bool is_over_seen(const SeenGround& seen, TriangleIndex triangle) const;
+  bool touches(const std::array<VertexIndex, 3>& triangle, std::uint32_t column,
+               std::uint32_t row) const;
 
   const Tin& tin_;
+  const Groups& groups_;
   CollapseHistory history_;
   std::vector<float> error_m_;  // [triangles]
   std::vector<std::uint32_t> made_by_;

@@ -1,9 +1,9 @@
 // Repeats the experiment of Law and Tan 1999 for docs/lawtan.md.
 //   lawtan_table towers COUNT WIDTH_M HEIGHT_M     round buildings over such ground, as CSV
-//   lawtan_table walk SCENE LEVELS FRAMES [CSV]    a row of each table: occluders, cells, a drive
-//   lawtan_table correction SCENE                  how often edge error correction hides what is
-//   seen lawtan_table views SCENE FRAME SVG             the refined surface from above, without and
-//   with
+//   lawtan_table walk SCENE ROUTE LEVELS FRAMES [CSV]  a row of each table: occluders, cells, a
+//   drive lawtan_table correction SCENE                  how often edge error correction hides what
+//   is seen lawtan_table views SCENE FRAME SVG             the refined surface from above, without
+//   and with
 //                                                  culling
 
 #include <fmt/core.h>
@@ -21,7 +21,9 @@
 #include "cli/loaded_scene.h"
 #include "cli/svg.h"
 #include "core/culling/cell_culling.h"
+#include "core/culling/certified_culling.h"
 #include "core/culling/certified_hiding.h"
+#include "core/culling/joint_hiding.h"
 #include "core/culling/occluder_hiding.h"
 #include "core/culling/selective_refinement.h"
 #include "core/occlusion/edge_correction.h"
@@ -38,6 +40,8 @@ constexpr int kTowerCorners = 32;
 /// Pixels that the refined surface may be off.
 constexpr double kMostPx = 1;
 constexpr Lens kLens{640, 360, 45};
+/// Cells that are made when the drive comes into them, not before.
+constexpr int kFineLevels = 11;
 /// Depths that differ by less belong to one place.
 constexpr float kDepthShare = 0.01F;
 
@@ -72,10 +76,10 @@ struct Walk {
   BoxTree tree;
   std::vector<Shot> shots;
 
-  Walk(const std::string& path, int frames)
+  Walk(const std::string& path, Route route, int frames)
       : scene(path), batches(scene.tin, scene.groups), tree(batches) {
     const GeoFrame::Placer placer(scene.frame);
-    for (const Waypoint& waypoint : find_path(scene, Route::kDrive, frames, kSeed))
+    for (const Waypoint& waypoint : find_path(scene, route, frames, kSeed))
       shots.push_back(shot_at(placer, waypoint, kLens));
   }
 
@@ -106,8 +110,28 @@ Target draw(const Tin& tin, const SelectiveRefinement::Drawing& drawing, const S
   return target;
 }
 
-/// @param cells  none: without culling
-Frames walk(const Walk& walk, const SelectiveRefinement& refinement, CellCulling* cells,
+/// Groups with a pixel in a picture of all triangles, four times as fine.
+CullingAnswer groups_seen(const Walk& walk, const Shot& shot) {
+  const Tin& tin = walk.scene.tin;
+  Target target = empty_target(2 * shot.width_px, 2 * shot.height_px);
+  rasterise(target,
+            project_all(look_at(shot.view, target.width_px, target.height_px), tin.vertices),
+            tin.triangles);
+  std::vector<std::uint8_t> is_seen(walk.batches.groups(), 0);
+  for (const std::uint32_t object : target.object)
+    if (object != kNone && walk.scene.groups.group_of_triangle[object] != kNone)
+      is_seen[walk.scene.groups.group_of_triangle[object]] = 1;
+  CullingAnswer answer;
+  for (GroupIndex g = 0; g < is_seen.size(); ++g)
+    if (is_seen[g]) answer.visible_groups.push_back(g);
+  return answer;
+}
+
+/// What may be seen of a frame, and how many nodes were looked at.
+using Find = std::function<CullingAnswer(std::size_t frame)>;
+
+/// @param find  none: without culling
+Frames walk(const Walk& walk, const SelectiveRefinement& refinement, const Find& find,
             const std::function<void(std::size_t, const Target&)>& see) {
   Frames frames;
   for (std::size_t f = 0; f < walk.shots.size(); ++f) {
@@ -116,8 +140,8 @@ Frames walk(const Walk& walk, const SelectiveRefinement& refinement, CellCulling
                                 const Shot& shot = walk.shots[f];
                                 std::optional<std::span<const GroupIndex>> visible;
                                 CullingAnswer answer;
-                                if (cells != nullptr) {
-                                  answer = cells->visible(camera_of(shot));
+                                if (find) {
+                                  answer = find(f);
                                   visible = answer.visible_groups;
                                   frames.nodes += answer.nodes_tested;
                                 }
@@ -156,8 +180,9 @@ void print_frames(const char* name, const Frames& frames, const Frames& whole) {
       frames.holes_px);
 }
 
-void print_walk(const std::string& path, int levels, int count, const std::string& csv) {
-  const Walk scene(path, count);
+void print_walk(const std::string& path, Route route, int levels, int count,
+                const std::string& csv) {
+  const Walk scene(path, route, count);
   const Tin& tin = scene.scene.tin;
   VirtualOccluders occluders;
   const double simplify_s = seconds_of([&] { occluders = find_virtual_occluders(tin, {}); });
@@ -190,14 +215,14 @@ void print_walk(const std::string& path, int levels, int count, const std::strin
   fmt::print("  levels of detail {:.1f} s; {} frames, {} px\n", levels_s, scene.shots.size(),
              kMostPx);
   std::vector<Target> pictures;
-  const Frames whole = walk(scene, *refinement, nullptr, [&](std::size_t, const Target& picture) {
+  const Frames whole = walk(scene, *refinement, {}, [&](std::size_t, const Target& picture) {
     pictures.push_back(picture);
     pictures.back().object.clear();
   });
   print_frames("without culling", whole, whole);
-  const auto with = [&](const char* name, CellCulling& cells) {
+  const auto with = [&](const char* name, const Find& find) {
     Frames differing;
-    Frames frames = walk(scene, *refinement, &cells, [&](std::size_t f, const Target& picture) {
+    Frames frames = walk(scene, *refinement, find, [&](std::size_t f, const Target& picture) {
       compare(pictures[f], picture, differing);
     });
     frames.differing_px = differing.differing_px;
@@ -205,9 +230,28 @@ void print_walk(const std::string& path, int levels, int count, const std::strin
     print_frames(name, frames, whole);
     return frames;
   };
-  const Frames by_occluders = with("cells, virtual occluders", *law_tan);
+  const auto by = [&](CullingMethod& method) {
+    return [&](std::size_t f) { return method.visible(camera_of(scene.shots[f])); };
+  };
+  const Frames by_occluders = with("cells, virtual occluders", by(*law_tan));
   std::optional<Frames> by_certified;
-  if (certified) by_certified = with("cells, certified regions", *certified);
+  if (certified) {
+    by_certified = with("cells, certified regions", by(*certified));
+    CellCulling fine(
+        "both",
+        std::make_unique<JointHiding>(
+            std::make_unique<CertifiedHiding>(scene.tree, scene.scene.groups.certified),
+            std::make_unique<OccluderHiding>(scene.tree, scene.batches, tin, occluders.sections)),
+        scene.ground_cells(kFineLevels));
+    with("both, fine cells on the way", by(fine));
+    fmt::print("    {} of these cells, {:.0f} kB\n", fine.trees()[0].size(),
+               static_cast<double>(fine.bytes()) / 1000);
+    CertifiedCulling each(scene.scene.groups.certified);
+    with("certified regions themselves", by(each));
+  }
+  std::vector<CullingAnswer> seen;
+  for (const Shot& shot : scene.shots) seen.push_back(groups_seen(scene, shot));
+  with("groups that are seen", [&](std::size_t f) { return seen[f]; });
   if (csv.empty()) return;
   std::ofstream file(csv);
   file << "frame,triangles,triangles_law_tan,triangles_certified,ms,ms_law_tan,ms_certified\n";
@@ -266,7 +310,7 @@ void write_curves(const std::string& csv, const std::string& svg) {
 }
 
 void print_correction(const std::string& path) {
-  const Walk scene(path, 1);
+  const Walk scene(path, Route::kDrive, 1);
   const Tin& tin = scene.scene.tin;
   CollapseOptions options;
   options.triangles_left = tin.triangles.size() / 10;
@@ -303,7 +347,7 @@ void print_correction(const std::string& path) {
 }
 
 void write_views(const std::string& path, std::size_t frame, const std::string& svg) {
-  const Walk scene(path, static_cast<int>(frame) + 1);
+  const Walk scene(path, Route::kDrive, static_cast<int>(frame) + 1);
   const Tin& tin = scene.scene.tin;
   const SelectiveRefinement refinement(tin, scene.scene.groups);
   CellCulling cells("certified regions",
@@ -362,8 +406,10 @@ int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "";
   if (what == "towers" && argc == 5)
     scarp::print_towers(std::atoi(argv[2]), std::atof(argv[3]), std::atof(argv[4]));
-  else if (what == "walk" && (argc == 5 || argc == 6))
-    scarp::print_walk(argv[2], std::atoi(argv[3]), std::atoi(argv[4]), argc == 6 ? argv[5] : "");
+  else if (what == "walk" && (argc == 6 || argc == 7))
+    scarp::print_walk(argv[2],
+                      std::string(argv[3]) == "walk" ? scarp::Route::kWalk : scarp::Route::kDrive,
+                      std::atoi(argv[4]), std::atoi(argv[5]), argc == 7 ? argv[6] : "");
   else if (what == "correction" && argc == 3)
     scarp::print_correction(argv[2]);
   else if (what == "curves" && argc == 4)

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <random>
+#include <set>
 
 #include "core/culling/certified_culling.h"
 #include "core/culling/certified_hiding.h"
+#include "core/culling/joint_hiding.h"
 #include "core/culling/occluder_hiding.h"
 #include "core/occlusion/certified/box_hiding.h"
 #include "core/occlusion/certified/certify_groups.h"
@@ -178,6 +180,38 @@ TEST(OccluderHiding, WhatIsHiddenFromABoxIsSeenByNoEyeInIt) {
   }
   EXPECT_GT(hidden, 1000U);
   EXPECT_GT(inner, 50U) << "whole nodes are found";
+}
+
+TEST(JointHiding, FindsWhatEitherFinds) {
+  const Scene& scene = hills();
+  const auto by_regions = [&] {
+    return std::make_unique<CertifiedHiding>(scene.tree, scene.regions);
+  };
+  const auto by_occluders = [&] {
+    return std::make_unique<OccluderHiding>(scene.tree, scene.batches, scene.ground.tin,
+                                            find_virtual_occluders(scene.ground.tin, {}).sections);
+  };
+  const auto regions = by_regions();
+  const auto occluders = by_occluders();
+  const JointHiding joint(by_regions(), by_occluders());
+  Draw draw(7);
+  std::size_t more_than_regions = 0;
+  for (int i = 0; i < 20; ++i) {
+    const Bounds box = draw.box_over(scene.ground.tin, 10);
+    std::set<GroupIndex> either;
+    for (const NodeHiding* one : {static_cast<const NodeHiding*>(regions.get()),
+                                  static_cast<const NodeHiding*>(occluders.get())})
+      for (const GroupIndex g : groups_below(scene.tree, one->find_hidden(box, {})))
+        either.insert(g);
+    const std::vector<NodeIndex> nodes = joint.find_hidden(box, {});
+    const auto found = groups_below(scene.tree, nodes);
+    EXPECT_EQ(std::set<GroupIndex>(found.begin(), found.end()), either);
+    EXPECT_EQ(found.size(), either.size()) << "none twice";
+    EXPECT_TRUE(std::is_sorted(nodes.begin(), nodes.end()));
+    more_than_regions +=
+        either.size() - groups_below(scene.tree, regions->find_hidden(box, {})).size();
+  }
+  EXPECT_GT(more_than_regions, 20U);
 }
 
 TEST(GroundHeights, AreThoseOfTheGroundInTheRectangle) {
