@@ -76,6 +76,25 @@ std::vector<CellSpace> cells_of_view(const LoadedScene& scene) {
   return walk_and_flight(scene.tin, std::sqrt(area_m2 / std::max(1U, scene.groups.leaf_count)) / 8);
 }
 
+/// Virtual occluders, where a method that asks for them flies.
+struct SectionsOfScene {
+  std::vector<UprightOccluder> sections;
+  double prepare_s = 0;
+
+  SectionsOfScene(const Tin& tin, bool are_wanted) {
+    if (!are_wanted) return;
+    const auto begun = std::chrono::steady_clock::now();
+    sections = find_virtual_occluders(tin, {}).sections;
+    prepare_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  }
+
+  std::uint64_t bytes() const {
+    std::uint64_t bytes = 0;
+    for (const UprightOccluder& section : sections) bytes += section.bytes();
+    return bytes;
+  }
+};
+
 std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& prepared,
                                      const std::vector<std::string>& wanted) {
   const GroupBatches& batches = prepared.batches;
@@ -96,19 +115,23 @@ std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& p
   add("hzb", true, 0, 0, [&] { return std::make_unique<HzbCulling>(scene.tin, batches); });
   add("mask", false, 0, 0,
       [&] { return std::make_unique<MaskCulling>(scene.tin, batches, prepared.tree); });
+  const SectionsOfScene sections(
+      scene.tin, wanted.empty() || std::any_of(wanted.begin(), wanted.end(), [](const auto& name) {
+                   return name == "cells" || name == "law-tan";
+                 }));
   const auto by_occluders = [&] {
-    return std::make_unique<OccluderHiding>(prepared.tree, batches, scene.tin,
-                                            find_virtual_occluders(scene.tin, {}).sections);
+    return std::make_unique<OccluderHiding>(prepared.tree, batches, scene.tin, sections.sections);
   };
   const auto cells = [&](const char* label, std::unique_ptr<NodeHiding> hiding) {
     return std::make_unique<CellCulling>(label, std::move(hiding), cells_of_view(scene));
   };
   if (scene.groups.has_certified())
-    add("cells", true, 0, 0, [&] {
+    add("cells", true, sections.prepare_s, sections.bytes(), [&] {
       auto by_regions = std::make_unique<CertifiedHiding>(prepared.tree, scene.groups.certified);
       return cells("cells", std::make_unique<JointHiding>(std::move(by_regions), by_occluders()));
     });
-  add("law-tan", true, 0, 0, [&] { return cells("law-tan", by_occluders()); });
+  add("law-tan", true, sections.prepare_s, sections.bytes(),
+      [&] { return cells("law-tan", by_occluders()); });
   ImageCullingOptions hom;
   add("hom", false, 0, 0, [&] { return std::make_unique<HomCulling>(batches, hom); });
   hom.opacity = kSmallGapOpacity;

@@ -41,6 +41,9 @@ class UprightOccluder {
   FullOcclusion judge(const Bounds& eyes, std::span<const Position> targets) const;
 
   const std::vector<Position>& top() const { return top_; }
+  std::uint64_t bytes() const {
+    return sizeof(*this) + top_.size() * sizeof(Position) + terms_.size() * sizeof(Term);
+  }
 
   /// "F0 & (F1 | F2)": the expression over the edges of the polyline, for people and tests.
   std::string expression() const { return text_of(0); }

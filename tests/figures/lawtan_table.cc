@@ -15,6 +15,7 @@
 #include <fstream>
 #include <functional>
 #include <numbers>
+#include <set>
 #include <string>
 
 #include "cli/fly/flight_path.h"
@@ -39,6 +40,7 @@ constexpr std::uint64_t kSeed = 1;
 constexpr int kTowerCorners = 32;
 /// Pixels that the refined surface may be off.
 constexpr double kMostPx = 1;
+constexpr double kViewMostPx = 3;
 constexpr Lens kLens{640, 360, 45};
 /// Cells that are made when the drive comes into them, not before.
 constexpr int kFineLevels = 11;
@@ -88,6 +90,13 @@ struct Walk {
     const Bounds ground = bounds_of(scene.tin.vertices);
     const double width_m = ground.high.x_m - ground.low.x_m;
     return {walk_and_flight(scene.tin, width_m / std::exp2(levels - 1)).front()};
+  }
+
+  std::unique_ptr<NodeHiding> both() const {
+    return std::make_unique<JointHiding>(
+        std::make_unique<CertifiedHiding>(tree, scene.groups.certified),
+        std::make_unique<OccluderHiding>(tree, batches, scene.tin,
+                                         find_virtual_occluders(scene.tin, {}).sections));
   }
 };
 
@@ -237,12 +246,7 @@ void print_walk(const std::string& path, Route route, int levels, int count,
   std::optional<Frames> by_certified;
   if (certified) {
     by_certified = with("cells, certified regions", by(*certified));
-    CellCulling fine(
-        "both",
-        std::make_unique<JointHiding>(
-            std::make_unique<CertifiedHiding>(scene.tree, scene.scene.groups.certified),
-            std::make_unique<OccluderHiding>(scene.tree, scene.batches, tin, occluders.sections)),
-        scene.ground_cells(kFineLevels));
+    CellCulling fine("both", scene.both(), scene.ground_cells(kFineLevels));
     with("both, fine cells on the way", by(fine));
     fmt::print("    {} of these cells, {:.0f} kB\n", fine.trees()[0].size(),
                static_cast<double>(fine.bytes()) / 1000);
@@ -350,9 +354,7 @@ void write_views(const std::string& path, std::size_t frame, const std::string& 
   const Walk scene(path, Route::kDrive, static_cast<int>(frame) + 1);
   const Tin& tin = scene.scene.tin;
   const SelectiveRefinement refinement(tin, scene.scene.groups);
-  CellCulling cells("certified regions",
-                    std::make_unique<CertifiedHiding>(scene.tree, scene.scene.groups.certified),
-                    scene.ground_cells(6));
+  CellCulling cells("both", scene.both(), scene.ground_cells(kFineLevels));
   const Shot& shot = scene.shots.back();
   const CullingAnswer answer = cells.visible(camera_of(shot));
   const Bounds ground = bounds_of(tin.vertices);
@@ -362,7 +364,7 @@ void write_views(const std::string& path, std::size_t frame, const std::string& 
   for (const int side : {0, 1}) {
     std::optional<std::span<const GroupIndex>> visible;
     if (side == 1) visible = answer.visible_groups;
-    const auto drawing = refinement.draw(shot, kMostPx, visible);
+    const auto drawing = refinement.draw(shot, kViewMostPx, visible);
     const double left_px = 10 + side * (wide_px + 20);
     const auto x_px = [&](const Position& p) { return left_px + scale * (p.x_m - ground.low.x_m); };
     const auto y_px = [&](const Position& p) { return 40 + scale * (ground.high.y_m - p.y_m); };
@@ -371,14 +373,16 @@ void write_views(const std::string& path, std::size_t frame, const std::string& 
         fmt::format("{}: {} triangles in the picture",
                     side == 0 ? "Without culling" : "With culling", drawing.triangles.size()));
     out += fmt::format("<path fill=\"none\" stroke=\"{}\" stroke-width=\"0.4\" d=\"", kSoftColour);
-    // Relative and in tenths of a pixel: thousands of triangles.
+    std::set<std::array<VertexIndex, 2>> edges;
     for (const TriangleIndex t : drawing.active) {
-      const auto& [a, b, c] = refinement.history().triangles[t];
-      out += fmt::format("M{:.1f} {:.1f}", x_px(tin.vertices[a]), y_px(tin.vertices[a]));
-      for (const VertexIndex v : {b, c})
-        out += fmt::format("L{:.1f} {:.1f}", x_px(tin.vertices[v]), y_px(tin.vertices[v]));
-      out += "Z";
+      const auto& corners = refinement.history().triangles[t];
+      for (std::size_t i = 0; i < 3; ++i)
+        edges.insert({std::min(corners[i], corners[(i + 1) % 3]),
+                      std::max(corners[i], corners[(i + 1) % 3])});
     }
+    for (const auto& [a, b] : edges)
+      out += fmt::format("M{:.1f} {:.1f}L{:.1f} {:.1f}", x_px(tin.vertices[a]),
+                         y_px(tin.vertices[a]), x_px(tin.vertices[b]), y_px(tin.vertices[b]));
     out += "\"/>\n";
     const double half_rad =
         std::atan(std::tan(kLens.vertical_field_of_view_deg * std::numbers::pi / 360) *
