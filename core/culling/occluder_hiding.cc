@@ -29,9 +29,7 @@ bool OccluderHiding::hides_each_triangle(const Bounds& eyes, GroupIndex group,
   for (const TriangleIndex t : triangles_[group]) {
     const auto& [a, b, c] = tin_.triangles[t];
     const std::array<Position, 3> corners = {tin_.vertices[a], tin_.vertices[b], tin_.vertices[c]};
-    const auto hides = [&](std::uint32_t o) {
-      return occluders_[o].judge(eyes, corners) == FullOcclusion::kHidden;
-    };
+    const auto hides = [&](std::uint32_t o) { return occluders_[o].hides(eyes, corners); };
     if (hides(last)) continue;
     const auto found = std::find_if(candidates.begin(), candidates.end(), hides);
     if (found == candidates.end()) return false;

@@ -10,6 +10,10 @@
 namespace scarp {
 namespace {
 
+/// Allowances for rounding of a share of the polyline and of a height: what may_hide says wrongly
+/// is only that something is not hidden.
+constexpr double kRounding = 0x1p-30, kHeightRoundingM = 0x1p-10;
+
 /// The upper corners: from them, and to them, lines run highest.
 std::array<Position, 4> upper_corners(const Bounds& box) {
   const auto& [low, high] = box;
@@ -49,8 +53,40 @@ UprightOccluder::UprightOccluder(std::vector<Position> top) : top_(std::move(top
   highest_m_ = std::max_element(top_.begin(), top_.end(), [](const Position& a, const Position& b) {
                  return a.z_m < b.z_m;
                })->z_m;
+  for (const Position& p : top_) along_.push_back(along(p.x_m, p.y_m));
   terms_.push_back({});
   grow(0, 0, static_cast<std::uint32_t>(top_.size() - 1), true);
+}
+
+double UprightOccluder::along(double x_m, double y_m) const {
+  const Position &from = top_.front(), &to = top_.back();
+  const double dx_m = to.x_m - from.x_m, dy_m = to.y_m - from.y_m;
+  return ((x_m - from.x_m) * dx_m + (y_m - from.y_m) * dy_m) / (dx_m * dx_m + dy_m * dy_m);
+}
+
+/// Whether one line may cross the plane below the polyline, in double: only to leave work out.
+bool UprightOccluder::may_hide(const Position& eye, const Position& target) const {
+  const Position &from = top_.front(), &to = top_.back();
+  const auto side = [&](const Position& p) {
+    return (to.x_m - from.x_m) * (p.y_m - from.y_m) - (to.y_m - from.y_m) * (p.x_m - from.x_m);
+  };
+  const double at_eye = side(eye), at_target = side(target);
+  if (at_eye * at_target >= 0) return false;
+  const double share = at_eye / (at_eye - at_target);
+  const double at =
+      along(eye.x_m + share * (target.x_m - eye.x_m), eye.y_m + share * (target.y_m - eye.y_m));
+  if (!(at >= -kRounding && at <= 1 + kRounding)) return false;
+  const auto next = std::upper_bound(along_.begin() + 1, along_.end() - 1, at);
+  const auto i = static_cast<std::size_t>(next - along_.begin());
+  const double within = (at - along_[i - 1]) / (along_[i] - along_[i - 1]);
+  const double top_m = top_[i - 1].z_m + within * (top_[i].z_m - top_[i - 1].z_m);
+  return eye.z_m + share * (target.z_m - eye.z_m) <= top_m + kHeightRoundingM;
+}
+
+bool UprightOccluder::hides(const Bounds& eyes, std::span<const Position> targets) const {
+  for (const Position& target : targets)
+    if (!may_hide(eyes.high, target)) return false;
+  return judge(eyes, targets) == FullOcclusion::kHidden;
 }
 
 void UprightOccluder::grow(std::uint32_t term, std::uint32_t from, std::uint32_t to,
@@ -120,6 +156,8 @@ FullOcclusion UprightOccluder::judge(const Bounds& eye_box, std::span<const Posi
   const bool within_to = eye_side > 0 ? at_to.first >= 0 : at_to.second <= 0;
   const bool within_from = eye_side > 0 ? at_from.second <= 0 : at_from.first >= 0;
   if (!within_to || !within_from) return FullOcclusion::kOpen;
+  for (const Position& target : targets)
+    if (!may_hide(eyes.front(), target)) return FullOcclusion::kOpen;
   return holds(terms_[0], eye_side, eyes, targets) ? FullOcclusion::kHidden : FullOcclusion::kOpen;
 }
 

@@ -40,9 +40,13 @@ class UprightOccluder {
   /// The same for the convex hull of some lattice places, such as a triangle's corners.
   FullOcclusion judge(const Bounds& eyes, std::span<const Position> targets) const;
 
+  /// judge(...) == kHidden, at less cost where it is not.
+  bool hides(const Bounds& eyes, std::span<const Position> targets) const;
+
   const std::vector<Position>& top() const { return top_; }
   std::uint64_t bytes() const {
-    return sizeof(*this) + top_.size() * sizeof(Position) + terms_.size() * sizeof(Term);
+    return sizeof(*this) + top_.size() * (sizeof(Position) + sizeof(double)) +
+           terms_.size() * sizeof(Term);
   }
 
   /// "F0 & (F1 | F2)": the expression over the edges of the polyline, for people and tests.
@@ -55,6 +59,8 @@ class UprightOccluder {
     std::uint32_t count = 0;
   };
 
+  double along(double x_m, double y_m) const;
+  bool may_hide(const Position& eye, const Position& target) const;
   void grow(std::uint32_t term, std::uint32_t from, std::uint32_t to, bool is_upper);
   FullOcclusion judge(const Bounds& eyes, std::span<const Position> targets, double lowest_m) const;
   bool holds(const Term& term, int eye_side, std::span<const Position> eyes,
@@ -62,6 +68,7 @@ class UprightOccluder {
   std::string text_of(std::uint32_t term) const;
 
   std::vector<Position> top_;
+  std::vector<double> along_;  // [corners] of the polyline, 0 at its begin, 1 at its end
   double highest_m_;
   std::vector<Term> terms_;  // the whole is the first
 };

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -76,6 +77,7 @@ TEST(UprightOccluder, ForAnEyeAndAPlaceItIsTheDefinition) {
     Position target = draw.in({{-20, 1, -10}, {120, 60, 40}});
     if (i % 2 == 0) std::swap(eye, target);
     const bool is_hidden = occluder.judge({eye, eye}, {target, target}) == FullOcclusion::kHidden;
+    ASSERT_EQ(occluder.hides({eye, eye}, std::array{target}), is_hidden) << i;
     if (is_hidden) {
       ASSERT_TRUE(passes_below(occluder, eye, target, 1e-6)) << i;
     } else {
