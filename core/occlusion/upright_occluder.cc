@@ -23,11 +23,17 @@ std::array<Position, 4> upper_corners(const Bounds& box) {
            {low.x_m, high.y_m, high.z_m}}};
 }
 
+int rounded_orient2d(const Position& a, const Position& b, const Position& c) {
+  const double side = (b.x_m - a.x_m) * (c.y_m - a.y_m) - (b.y_m - a.y_m) * (c.x_m - a.x_m);
+  return (side > 0) - (side < 0);
+}
+
 /// The side of a line in the plane that all places are strictly on, 0 where there is none.
-int side_of(const Position& a, const Position& b, std::span<const Position> places) {
+template <class Orient>
+int side_of(Orient orient, const Position& a, const Position& b, std::span<const Position> places) {
   int side = 0;
   for (const Position& corner : places) {
-    const int here = orient2d(a, b, corner);
+    const int here = orient(a, b, corner);
     if (here == 0 || here == -side) return 0;
     side = here;
   }
@@ -35,15 +41,38 @@ int side_of(const Position& a, const Position& b, std::span<const Position> plac
 }
 
 /// Least and greatest side of a place against the lines from eyes to targets.
-std::pair<int, int> sides_against_lines(std::span<const Position> eyes,
+template <class Orient>
+std::pair<int, int> sides_against_lines(Orient orient, std::span<const Position> eyes,
                                         std::span<const Position> targets, const Position& place) {
   std::pair<int, int> sides{1, -1};
   for (const Position& eye : eyes)
     for (const Position& target : targets) {
-      const int side = orient2d(eye, target, place);
+      const int side = orient(eye, target, place);
       sides = {std::min(sides.first, side), std::max(sides.second, side)};
     }
   return sides;
+}
+
+/// What the plane tells: kHidden where all lines cross the occluder's own.
+/// @param eye_side[out]  of the eyes, against from -> to
+template <class Orient>
+FullOcclusion judge_in_plane(Orient orient, const Position& from, const Position& to,
+                             std::span<const Position> eyes, std::span<const Position> targets,
+                             int& eye_side) {
+  eye_side = side_of(orient, from, to, eyes);
+  if (eye_side == 0) return FullOcclusion::kNever;
+  const int target_side = side_of(orient, from, to, targets);
+  if (target_side == eye_side) return FullOcclusion::kNever;
+  // Looking across from the left of from -> to, `to` is on the left and `from` on the right.
+  const auto at_to = sides_against_lines(orient, eyes, targets, to);
+  const auto at_from = sides_against_lines(orient, eyes, targets, from);
+  const bool all_beyond_to = eye_side > 0 ? at_to.second < 0 : at_to.first > 0;
+  const bool all_beyond_from = eye_side > 0 ? at_from.first > 0 : at_from.second < 0;
+  if (all_beyond_to || all_beyond_from) return FullOcclusion::kNever;
+  const bool within_to = eye_side > 0 ? at_to.first >= 0 : at_to.second <= 0;
+  const bool within_from = eye_side > 0 ? at_from.second <= 0 : at_from.first >= 0;
+  return target_side != 0 && within_to && within_from ? FullOcclusion::kHidden
+                                                      : FullOcclusion::kOpen;
 }
 
 }  // namespace
@@ -142,22 +171,14 @@ FullOcclusion UprightOccluder::judge(const Bounds& eye_box, std::span<const Posi
   if (eye_box.low.z_m > highest_m_ && lowest_m > highest_m_) return FullOcclusion::kNever;
   const std::array<Position, 4> eyes = upper_corners(eye_box);
   const Position &from = top_.front(), &to = top_.back();
-  const int eye_side = side_of(from, to, eyes);
-  if (eye_side == 0) return FullOcclusion::kNever;
-  const int target_side = side_of(from, to, targets);
-  if (target_side == eye_side) return FullOcclusion::kNever;
-  // Looking across from the left of from -> to, `to` is on the left and `from` on the right.
-  const auto at_to = sides_against_lines(eyes, targets, to);
-  const auto at_from = sides_against_lines(eyes, targets, from);
-  const bool all_beyond_to = eye_side > 0 ? at_to.second < 0 : at_to.first > 0;
-  const bool all_beyond_from = eye_side > 0 ? at_from.first > 0 : at_from.second < 0;
-  if (all_beyond_to || all_beyond_from) return FullOcclusion::kNever;
-  if (target_side == 0) return FullOcclusion::kOpen;
-  const bool within_to = eye_side > 0 ? at_to.first >= 0 : at_to.second <= 0;
-  const bool within_from = eye_side > 0 ? at_from.second <= 0 : at_from.first >= 0;
-  if (!within_to || !within_from) return FullOcclusion::kOpen;
+  // Most are not hidden, which rounding may say: only kHidden has to be exact.
+  int eye_side = 0;
+  const FullOcclusion rounded = judge_in_plane(rounded_orient2d, from, to, eyes, targets, eye_side);
+  if (rounded != FullOcclusion::kHidden) return rounded;
   for (const Position& target : targets)
     if (!may_hide(eyes.front(), target)) return FullOcclusion::kOpen;
+  if (judge_in_plane(orient2d, from, to, eyes, targets, eye_side) != FullOcclusion::kHidden)
+    return FullOcclusion::kOpen;
   return holds(terms_[0], eye_side, eyes, targets) ? FullOcclusion::kHidden : FullOcclusion::kOpen;
 }
 
