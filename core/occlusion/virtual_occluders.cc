@@ -163,6 +163,27 @@ std::optional<UprightOccluder> occluder_from(const TinIndex& index, Section sect
   return std::nullopt;
 }
 
+/// Whether a section runs so near to a ridge's middle, and so high there, that another one through
+/// it would hide little more.
+bool serves(const UprightOccluder& section, const Position& middle, double length_m,
+            double near_m) {
+  const Position &from = section.top().front(), &to = section.top().back();
+  const double dx_m = to.x_m - from.x_m, dy_m = to.y_m - from.y_m;
+  const double long_m = std::hypot(dx_m, dy_m);
+  const double x_m = middle.x_m - from.x_m, y_m = middle.y_m - from.y_m;
+  const double along_m = (x_m * dx_m + y_m * dy_m) / long_m;
+  const double beside_m = std::abs(x_m * dy_m - y_m * dx_m) / long_m;
+  if (beside_m > length_m || along_m < length_m || along_m > long_m - length_m) return false;
+  for (std::size_t i = 0; i + 1 < section.top().size(); ++i) {
+    const Position &a = section.top()[i], &b = section.top()[i + 1];
+    const double piece_m = std::hypot(b.x_m - a.x_m, b.y_m - a.y_m);
+    const double within_m = along_m - std::hypot(a.x_m - from.x_m, a.y_m - from.y_m);
+    if (within_m < 0 || within_m > piece_m) continue;
+    return a.z_m + within_m / piece_m * (b.z_m - a.z_m) > middle.z_m - near_m;
+  }
+  return false;
+}
+
 }  // namespace
 
 bool is_under_ground(const TinIndex& index, const std::vector<Position>& polyline) {
@@ -206,8 +227,23 @@ VirtualOccluders find_virtual_occluders(const Tin& tin, const VirtualOccluderOpt
     sections[i] = occluder_from(index, section_through(index, bounds, a, b, options.reach),
                                 options.most_corners);
   });
-  for (std::optional<UprightOccluder>& section : sections)
-    if (section) found.sections.push_back(std::move(*section));
+  const double near_m = options.near_share * (bounds.high.z_m - bounds.low.z_m);
+  for (std::size_t i = 0; i < ridges.size(); ++i) {
+    if (!sections[i]) continue;
+    const auto& corners = mesh.triangles[ridges[i].triangle];
+    const Position &a = mesh.vertices[corners[(ridges[i].corner + 1) % 3]],
+                   &b = mesh.vertices[corners[(ridges[i].corner + 2) % 3]];
+    const Position middle{(a.x_m + b.x_m) / 2, (a.y_m + b.y_m) / 2, (a.z_m + b.z_m) / 2};
+    const double length_m = std::hypot(b.x_m - a.x_m, b.y_m - a.y_m);
+    const bool is_served = std::any_of(
+        found.sections.begin(), found.sections.end(), [&](const UprightOccluder& earlier) {
+          const Position &from = earlier.top().front(), &to = earlier.top().back();
+          const Heading same = heading_along(to.x_m - from.x_m, to.y_m - from.y_m);
+          const Heading own = heading_along(b.x_m - a.x_m, b.y_m - a.y_m);
+          return same.x == own.x && same.y == own.y && serves(earlier, middle, length_m, near_m);
+        });
+    if (!is_served) found.sections.push_back(std::move(*sections[i]));
+  }
   return found;
 }
 

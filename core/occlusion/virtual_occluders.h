@@ -17,6 +17,9 @@ struct VirtualOccluderOptions {
   std::size_t most_sections = 4000;  ///< sections kept, of the longest and most prominent ridges
   /// A section goes on to both sides for so many times its ridge edge's length.
   double reach = 8;
+  /// A ridge has no section of its own where a more prominent one's, in the same direction, passes
+  /// it not lower than this share of the relief.
+  double near_share = 0.01;
   std::size_t most_corners = 12;  ///< of a section's polyline
 };
 
