@@ -17,10 +17,14 @@
 #include "cli/scene_culling.h"
 #include "core/culling/box_tree.h"
 #include "core/culling/cell_culling.h"
+#include "core/culling/certified_hiding.h"
 #include "core/culling/image_culling.h"
+#include "core/culling/joint_hiding.h"
 #include "core/culling/mask_culling.h"
+#include "core/culling/occluder_hiding.h"
 #include "core/culling/query_culling.h"
 #include "core/error/error.h"
+#include "core/occlusion/virtual_occluders.h"
 #include "tiles/layers/png_image.h"
 #include "tiles/store/part_folder.h"
 
@@ -65,20 +69,31 @@ struct Prepared {
   }
 };
 
-/// Where cells are made: the ground and what is above it, as far as the highest is above the
-/// lowest.
-Bounds airspace(const Tin& tin) {
-  Bounds space = bounds_of(tin.vertices);
-  space.high.z_m += std::max(1.0, space.high.z_m - space.low.z_m);
-  return space;
+/// Cells of view, the smallest an eighth as wide as the mean group is.
+std::vector<CellSpace> cells_of_view(const LoadedScene& scene) {
+  const Bounds ground = bounds_of(scene.tin.vertices);
+  const double area_m2 = (ground.high.x_m - ground.low.x_m) * (ground.high.y_m - ground.low.y_m);
+  return walk_and_flight(scene.tin, std::sqrt(area_m2 / std::max(1U, scene.groups.leaf_count)) / 8);
 }
 
-/// Cells are divided down to a quarter of the mean group's radius.
-double least_cell_m(const CertifiedRegions& regions) {
-  double sum_m = 0;
-  for (const CertifiedGroup& group : regions.groups) sum_m += static_cast<double>(group.radius_m);
-  return sum_m / static_cast<double>(regions.groups.size()) / 4;
-}
+/// Virtual occluders, where a method that asks for them flies.
+struct SectionsOfScene {
+  std::vector<UprightOccluder> sections;
+  double prepare_s = 0;
+
+  SectionsOfScene(const Tin& tin, bool are_wanted) {
+    if (!are_wanted) return;
+    const auto begun = std::chrono::steady_clock::now();
+    sections = find_virtual_occluders(tin, {}).sections;
+    prepare_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  }
+
+  std::uint64_t bytes() const {
+    std::uint64_t bytes = 0;
+    for (const UprightOccluder& section : sections) bytes += section.bytes();
+    return bytes;
+  }
+};
 
 std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& prepared,
                                      const std::vector<std::string>& wanted) {
@@ -100,11 +115,23 @@ std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& p
   add("hzb", true, 0, 0, [&] { return std::make_unique<HzbCulling>(scene.tin, batches); });
   add("mask", false, 0, 0,
       [&] { return std::make_unique<MaskCulling>(scene.tin, batches, prepared.tree); });
+  const SectionsOfScene sections(
+      scene.tin, wanted.empty() || std::any_of(wanted.begin(), wanted.end(), [](const auto& name) {
+                   return name == "cells" || name == "law-tan";
+                 }));
+  const auto by_occluders = [&] {
+    return std::make_unique<OccluderHiding>(prepared.tree, batches, scene.tin, sections.sections);
+  };
+  const auto cells = [&](const char* label, std::unique_ptr<NodeHiding> hiding) {
+    return std::make_unique<CellCulling>(label, std::move(hiding), cells_of_view(scene));
+  };
   if (scene.groups.has_certified())
-    add("cells", true, 0, 0, [&] {
-      return std::make_unique<CellCulling>(scene.groups.certified, airspace(scene.tin),
-                                           least_cell_m(scene.groups.certified));
+    add("cells", true, sections.prepare_s, sections.bytes(), [&] {
+      auto by_regions = std::make_unique<CertifiedHiding>(prepared.tree, scene.groups.certified);
+      return cells("cells", std::make_unique<JointHiding>(std::move(by_regions), by_occluders()));
     });
+  add("law-tan", true, sections.prepare_s, sections.bytes(),
+      [&] { return cells("law-tan", by_occluders()); });
   ImageCullingOptions hom;
   add("hom", false, 0, 0, [&] { return std::make_unique<HomCulling>(batches, hom); });
   hom.opacity = kSmallGapOpacity;

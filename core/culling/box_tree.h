@@ -8,15 +8,21 @@
 
 namespace scarp {
 
+/// Number of a node of a BoxTree.
+using NodeIndex = std::uint32_t;
+
 /// A kd-tree over the boxes of a scene's groups, split in plan: each inner node has two children,
-/// each leaf one group.
+/// each leaf one group. Nodes are numbered in pre-order: what is below a node are the numbers after
+/// it, up to last_below.
 class BoxTree {
  public:
   struct Node {
     Bounds box;
     std::uint32_t first, count;  // of groups()
     std::uint32_t triangles;     // of all of them
-    std::uint32_t left, right;   // children, kNone in a leaf
+    NodeIndex left, right;       // children, kNone in a leaf
+
+    bool is_leaf() const { return left == kNone; }
   };
 
   /// Cost: O(n log n).
@@ -24,6 +30,8 @@ class BoxTree {
 
   /// Node 0 is the root; none where there are no groups.
   std::span<const Node> nodes() const { return nodes_; }
+  /// The greatest number of a node and those below it.
+  NodeIndex last_below(NodeIndex node) const { return node + 2 * nodes_[node].count - 2; }
   /// The groups of a node.
   std::span<const GroupIndex> groups_of(const Node& node) const {
     return std::span(groups_).subspan(node.first, node.count);

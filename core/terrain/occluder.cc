@@ -90,6 +90,34 @@ struct Comparison {
   bool is_broken = false;  // by a border of the finer surface
 };
 
+/// Whether a triangle holds a place in the plane, its border included. Exact.
+bool holds(const Corners& t, const Position& p) {
+  for (std::size_t i = 0; i < 3; ++i)
+    if (orient2d(t[i], t[(i + 1) % 3], p) < 0) return false;
+  return true;
+}
+
+/// Whether two edges cross in the plane, at the inside of both, with the first above the second.
+/// Exact.
+bool crosses_above(const Position& a, const Position& b, const Position& c, const Position& d) {
+  if (orient2d(a, b, c) * orient2d(a, b, d) >= 0) return false;
+  const int turn = orient2d(c, d, b);
+  if (orient2d(c, d, a) * turn >= 0) return false;
+  // Above the plane through c, d and a, b says which way a-b leaves it, and c-d lies in it.
+  return orient3d(c, d, a, b) * -turn > 0;
+}
+
+/// Whether a triangle lies above another somewhere over both: at a corner of their overlay. Exact.
+bool is_above(const Corners& s, const Corners& t) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (holds(t, s[i]) && orient3d(t[0], t[1], t[2], s[i]) > 0) return true;
+    if (holds(s, t[i]) && orient3d(s[0], s[1], s[2], t[i]) < 0) return true;
+    for (std::size_t k = 0; k < 3; ++k)
+      if (crosses_above(s[i], s[(i + 1) % 3], t[k], t[(k + 1) % 3])) return true;
+  }
+  return false;
+}
+
 /// The finer surface of a comparison.
 class FinerSurface {
  public:
@@ -106,6 +134,23 @@ class FinerSurface {
                             tin.vertices[tin.triangles[t][(i + 2) % 3]]});
     borders_.fill(static_cast<std::uint32_t>(edges_.size()),
                   [&](std::uint32_t e) { return edges_[e]; });
+  }
+
+  /// What check_under says of one triangle.
+  std::optional<std::string> check(const Corners& t, std::vector<std::uint32_t>& found) const {
+    bool is_met = false;
+    triangles_.find(t, found);
+    for (const std::uint32_t other : found) {
+      const Corners upper = corners_of(tin_, other);
+      if (!overlap(t, upper)) continue;
+      is_met = true;
+      if (is_above(t, upper)) return "above triangle " + std::to_string(other);
+    }
+    if (!is_met) return "over void";
+    borders_.find(t, found);
+    for (const std::uint32_t e : found)
+      if (runs_through(edges_[e], t)) return "partly over void";
+    return std::nullopt;
   }
 
   /// @param found  memory to be reused
@@ -193,6 +238,15 @@ SurfaceGap measure_gap(const Tin& coarse, const Tin& finer) {
     gap.below_m = std::max(gap.below_m, found.gap.below_m);
   }
   return gap;
+}
+
+std::optional<std::string> check_under(const Tin& lower, const Tin& upper) {
+  const FinerSurface surface(upper);
+  std::vector<std::uint32_t> found;
+  for (std::size_t t = 0; t < lower.triangles.size(); ++t)
+    if (const auto broken = surface.check(corners_of(lower, t), found))
+      return "triangle " + std::to_string(t) + " lies " + *broken;
+  return std::nullopt;
 }
 
 Occluder lower_under(const Tin& coarse, std::span<const std::int64_t> sample_of_vertex,

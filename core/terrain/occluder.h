@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "core/terrain/tile_scheme.h"
@@ -47,6 +49,11 @@ struct Occluder {
 /// Cost: as measure_gap.
 Occluder lower_under(const Tin& coarse, std::span<const std::int64_t> sample_of_vertex,
                      const Tin& finer);
+
+/// Names a place where a surface lies above another, or has ground where that has none; nothing
+/// where it is nowhere above it. Decided exactly, at every corner of the overlay of the triangles.
+/// Requires neighbours of both. Cost: as measure_gap.
+std::optional<std::string> check_under(const Tin& lower, const Tin& upper);
 
 /// A tile's surface: its mesh at the finest level, its mesh or its occluder at coarser ones.
 struct SeenTile {

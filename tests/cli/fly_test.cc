@@ -65,9 +65,9 @@ TEST_F(FlyCommand, MethodsThatClaimItShowNoWrongPixelAndLeaveSomethingOut) {
       EXPECT_EQ(method["wrong_px"], json::array({0, 0})) << name;
       EXPECT_EQ(method["missed_groups"], 0) << name;
     }
-    EXPECT_EQ(methods, (std::set<std::string>{"frustum", "thesis", "certified", "cells", "hzb",
-                                              "mask", "hom", "hom-0.7", "lod-query", "multi-frame",
-                                              "stop-and-wait"}));
+    EXPECT_EQ(methods, (std::set<std::string>{"frustum", "thesis", "certified", "cells", "law-tan",
+                                              "hzb", "mask", "hom", "hom-0.7", "lod-query",
+                                              "multi-frame", "stop-and-wait"}));
   }
 }
 
