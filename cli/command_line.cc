@@ -8,6 +8,7 @@
 
 #include "cli/build/certified_settings.h"
 #include "cli/commands.h"
+#include "cli/export.h"
 #include "cli/stage_clock.h"
 #include "core/error/error.h"
 #include "core/threads/parallel_for.h"
@@ -446,6 +447,23 @@ void add_check(CLI::App& app, CheckOptions& o, std::function<int()>& run) {
   c->callback([&] { run = [&o] { return run_check(o); }; });
 }
 
+void add_export(CLI::App& app, ExportOptions& o, std::function<int()>& run) {
+  CLI::App* c = app.add_subcommand("export", "Write a scene for simulators and GIS");
+  c->footer("Example:\n  scarp export alps.scene --to 3dtiles -o alps-tiles");
+  c->add_option("scene", o.scene, "A scene")->required();
+  c->add_option("-o,--output", o.output, "A new folder")->required();
+  std::string names;
+  for (const Exporter& exporter : exporters())
+    names += fmt::format("{}{}: {}", names.empty() ? "" : "; ", exporter.name, exporter.help);
+  c->add_option("--to", o.to, names)->required()->check([](const std::string& text) {
+    return find_exporter(text) != nullptr ? "" : text + " is not a format that is known";
+  });
+  c->add_flag("--compress", o.compress,
+              "3dtiles: meshes as EXT_meshopt_compression, a third of the bytes");
+  add_common(*c, o.common);
+  c->callback([&] { run = [&o] { return run_export(o); }; });
+}
+
 /// "Error: message" without line breaks, so that scripts can rely on one line.
 int report(const std::string& message, int exit_code) {
   std::string line = message;
@@ -471,6 +489,7 @@ int run_command_line(int argc, char** argv) {
   SightOptions sight;
   HorizonOptions horizon;
   CheckOptions check;
+  ExportOptions to;
   std::function<int()> run;
   add_build(app, build, run);
   add_cull(app, cull, run);
@@ -482,6 +501,7 @@ int run_command_line(int argc, char** argv) {
   add_sight(app, sight, run);
   add_horizon(app, horizon, run);
   add_check(app, check, run);
+  add_export(app, to, run);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& e) {
@@ -492,9 +512,9 @@ int run_command_line(int argc, char** argv) {
     return report(e.what(), 2);
   }
   try {
-    for (CommonOptions* common :
-         {&build.common, &cull.common, &verify.common, &compare.common, &fly.common,
-          &preview.common, &viewshed.common, &sight.common, &horizon.common, &check.common}) {
+    for (CommonOptions* common : {&build.common, &cull.common, &verify.common, &compare.common,
+                                  &fly.common, &preview.common, &viewshed.common, &sight.common,
+                                  &horizon.common, &check.common, &to.common}) {
       if (!common->memory_budget_bytes) common->memory_budget_bytes = machine_memory_bytes() / 2;
       if (common->threads) set_thread_count(common->threads);
     }

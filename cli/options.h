@@ -201,6 +201,14 @@ struct CheckOptions {
   std::string scene;
 };
 
+struct ExportOptions {
+  CommonOptions common;
+  std::string scene;
+  std::string output;     ///< a folder
+  std::string to;         ///< name of an exporter (export.h)
+  bool compress = false;  ///< 3dtiles
+};
+
 /// Reads "X,Y[,H]". Throws Error{kUsage}.
 TypedPosition parse_position(const std::string& text);
 

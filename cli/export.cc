@@ -1,0 +1,53 @@
+#include "cli/export.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.h"
+#include "cli/outputs.h"
+#include "cli/scene_tiles.h"
+#include "cli/stages.h"
+
+namespace scarp {
+namespace {
+
+constexpr std::array kExporters = {
+    Exporter{"3dtiles", "a tileset of 3D Tiles 1.1", "tileset.json", export_tileset},
+};
+
+}  // namespace
+
+std::span<const Exporter> exporters() {
+  return kExporters;
+}
+
+const Exporter* find_exporter(std::string_view name) {
+  const auto found = std::find_if(kExporters.begin(), kExporters.end(),
+                                  [&](const Exporter& e) { return name == e.name; });
+  return found == kExporters.end() ? nullptr : &*found;
+}
+
+int run_export(const ExportOptions& options) {
+  const Exporter& exporter = *find_exporter(options.to);
+  SceneTiles scene(options.scene);
+  PartFolder folder(options.output, exporter.mark, existing(options.common));
+  Stages stages(!options.common.json);
+  nlohmann::json result = {{"format", exporter.name}, {"output", options.output}};
+  exporter.write(options, scene, folder, stages, result);
+  folder.commit();
+  stages.finish();
+  if (options.common.json) {
+    result["stages"] = stages_json(stages);
+    fmt::print("{}\n", result.dump(2));
+    return 0;
+  }
+  fmt::print("{}: {}\n", options.output, exporter.help);
+  for (const auto& [name, value] : result.items())
+    if (value.is_number() || value.is_boolean()) fmt::print("  {}: {}\n", name, value.dump());
+  return 0;
+}
+
+}  // namespace scarp
