@@ -16,6 +16,9 @@ namespace {
 
 constexpr std::array kExporters = {
     Exporter{"3dtiles", "a tileset of 3D Tiles 1.1", "tileset.json", export_tileset},
+    Exporter{"gpkg", "groups as polygons, a GeoPackage", "groups.gpkg", export_geopackage},
+    Exporter{"ugrid", "the mesh as UGRID netCDF, with its groups, error and horizons", "mesh.nc",
+             export_ugrid},
 };
 
 }  // namespace

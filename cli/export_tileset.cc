@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 
 #include "cli/export.h"
+#include "cli/scene_report.h"
 #include "cli/scene_tiles.h"
 #include "cli/stages.h"
 #include "core/error/error.h"
@@ -26,42 +26,6 @@ constexpr std::uint64_t kBytesPerTriangle = 500;
 
 /// Less than any distance from a frame's origin to the ellipsoid, metres.
 constexpr double kEarthM = 6.35e6;
-
-/// How far the levels of a scene lie from its source, metres in the frame, by its report.
-class LevelErrors {
- public:
-  LevelErrors(const Scene& scene, std::int32_t finest_level) : errors_m_(finest_level + 1) {
-    const std::string path = scene.path() + "/report.json";
-    json report;
-    try {
-      report = json::parse(std::ifstream(path));
-      const double own_m = report.at("mesh").at("error_over_surface_m").get<double>();
-      errors_m_.back() = own_m;
-      for (const json& level : report.value("levels", json::array()))
-        if (level.at("triangles").get<std::uint64_t>() > 0)
-          errors_m_.at(level.at("level").get<std::size_t>()) =
-              own_m + std::max(level.at("above_finest_m").get<double>(),
-                               level.at("below_finest_m").get<double>());
-    } catch (const std::exception& e) {
-      throw Error(ErrorCode::kCorrupt,
-                  fmt::format("'{}': does not tell the errors of the scene's levels ({}); build "
-                              "the scene again",
-                              path, e.what()));
-    }
-    // A level is never better than a finer one, whatever was measured; one without tiles (near the
-    // root of long rasters) counts as twice the next.
-    for (std::int32_t level = finest_level - 1; level >= 0; --level) {
-      double& error_m = errors_m_[static_cast<std::size_t>(level)];
-      const double finer_m = errors_m_[static_cast<std::size_t>(level) + 1];
-      error_m = error_m == 0 ? 2 * finer_m : std::max(error_m, finer_m);
-    }
-  }
-
-  double at(std::int32_t level) const { return errors_m_[static_cast<std::size_t>(level)]; }
-
- private:
-  std::vector<double> errors_m_;
-};
 
 /// The scene's tiles as a quadtree.
 struct ScenePyramid {
@@ -107,7 +71,7 @@ class TilesetExport {
         scene_(scene),
         folder_(folder),
         pyramid_(scene.scene().description()),
-        errors_(scene.scene(), pyramid_.finest_level),
+        errors_m_(SceneReport(scene.scene()).level_errors_m(pyramid_.finest_level)),
         globe_(scene.frame()),
         frame_(tileset_frame()) {
     for (std::size_t i = 0; i < scene.size(); ++i) number_of_tile_[tile_id(scene.tile(i))] = i;
@@ -328,7 +292,8 @@ class TilesetExport {
     }
     const double lowest_m = tiles_.at({}).facts.least_height_m;
     for (auto& [id, tile] : tiles_) {
-      tile.geometric_error_m = errors_.at(id.level) * height_scale(tile.facts);
+      tile.geometric_error_m =
+          errors_m_[static_cast<std::size_t>(id.level)] * height_scale(tile.facts);
       tile.horizon_point = horizon_point(hulls_.at(id), frame_.to_ecef(tile.facts.box.centre),
                                          kWgs84, std::max(0.0, -lowest_m));
       if (has_horizons_) tile.horizon = horizons_.at(id);
@@ -428,7 +393,7 @@ class TilesetExport {
   const SceneTiles& scene_;
   const PartFolder& folder_;
   const ScenePyramid pyramid_;
-  const LevelErrors errors_;
+  const std::vector<double> errors_m_;  // of levels
   const Globe globe_;
   const TilesetFrame frame_;
   bool has_horizons_ = false;

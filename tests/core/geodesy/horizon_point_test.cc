@@ -69,8 +69,9 @@ double least_height_m(const EcefPoint& from, const EcefPoint& to) {
                              from.z_m + t * (to.z_m - from.z_m)})
         .height_m;
   };
+  // 40 rounds leave 1e-7 of a segment: micrometres of height around its lowest place.
   double low = 0, high = 1;
-  for (int i = 0; i < 100; ++i) {
+  for (int i = 0; i < 40; ++i) {
     const double a = low + (high - low) / 3, b = high - (high - low) / 3;
     (height_at(a) < height_at(b) ? high : low) = height_at(a) < height_at(b) ? b : a;
   }
@@ -89,16 +90,16 @@ void check_rays(const TileCase& tile, std::uint64_t seed) {
     return std::uniform_real_distribution<double>(low, high)(random);
   };
   int hidden = 0;
-  for (int round = 0; round < 60; ++round) {
+  for (int round = 0; round < 24; ++round) {
     const Place middle{uniform(-std::numbers::pi, std::numbers::pi), std::asin(uniform(-1, 1))};
     std::vector<EcefPoint> ground;
-    for (int i = 0; i < 12; ++i)
+    for (int i = 0; i < 8; ++i)
       ground.push_back(middle.moved(tile.wide_rad * std::sqrt(uniform(0, 1)), uniform(0, 2 * M_PI))
                            .at(uniform(tile.lowest_m, tile.highest_m)));
     const double depth_m = std::max(0.0, -tile.lowest_m);
     const auto point = horizon_point(ground, middle.at(0), kWgs84, depth_m);
     ASSERT_TRUE(point.has_value());
-    for (int i = 0; i < 60; ++i) {
+    for (int i = 0; i < 40; ++i) {
       // Mostly around the horizon of low cameras, where a point that lies too near gives itself
       // away.
       const double height_m = std::exp(uniform(0, 16)) - 1 - (i % 3 == 0 ? depth_m : 0);
@@ -119,7 +120,7 @@ void check_rays(const TileCase& tile, std::uint64_t seed) {
       }
     }
   }
-  EXPECT_GT(hidden, 200);
+  EXPECT_GT(hidden, 50);
 }
 
 TEST(HorizonPoint, HidesOnlyWhatTheEarthHides) {
