@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/support/glb_reader.h"
@@ -50,7 +51,7 @@ std::vector<std::array<std::int64_t, 10>> triangles_of(const PlacedGround& place
       for (std::size_t i = 0; i < 3; ++i) steps[3 * corner + i] = std::llround(p[i] / kFinestStepM);
     }
     const GroupIndex group = placed.groups.group_of_triangle[t];
-    steps[9] = group == kNone ? -1 : 100 + group;
+    steps[9] = group == kNone ? -1 : 100 + static_cast<std::int64_t>(group);
     all.push_back(steps);
   }
   return all;

@@ -20,8 +20,8 @@ struct Valley {
 
 /// Rough ground within a ring of ridges of uneven height; the tile is what lies within the ring.
 Valley valley_in_ridges(std::uint64_t seed) {
-  constexpr int kSide = 56;
-  constexpr double kCellM = 30, kRingM = 600, kTileM = 330;
+  constexpr int kSide = 44;
+  constexpr double kCellM = 30, kRingM = 460, kTileM = 250;
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> rough(0, 8);
   const double turn = rough(random);
@@ -34,8 +34,8 @@ Valley valley_in_ridges(std::uint64_t seed) {
       }));
   const LeafGroups groups = group_by_squares(tin, 24);
   HidingOptions options;
-  options.fans = 64;
-  options.sectors = 64;
+  options.fans = 32;
+  options.sectors = 32;
   const CertifiedRegions all = certify_groups(tin, groups.group_of_triangle, groups.count, options);
   const double middle_m = kSide / 2 * kCellM;
   Valley valley;
