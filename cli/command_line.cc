@@ -460,6 +460,9 @@ void add_export(CLI::App& app, ExportOptions& o, std::function<int()>& run) {
   });
   c->add_flag("--compress", o.compress,
               "3dtiles: meshes as EXT_meshopt_compression, a third of the bytes");
+  c->add_option("--dem", o.dem_files,
+                "ugrid: the DEMs that the scene was built from, for the error of each triangle; "
+                "without them all have the greatest one");
   add_common(*c, o.common);
   c->callback([&] { run = [&o] { return run_export(o); }; });
 }

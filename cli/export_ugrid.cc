@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <numeric>
@@ -13,7 +14,10 @@
 #include "cli/stages.h"
 #include "core/error/error.h"
 #include "core/threads/parallel_for.h"
+#include "ingest/dem/dem_windows.h"
+#include "ingest/mesh/mesh.h"
 #include "tiles/layers/ugrid.h"
+#include "tiles/store/tin_file.h"
 
 namespace scarp {
 namespace {
@@ -34,6 +38,64 @@ void check_memory(const ExportOptions& options, const SceneTiles& scene) {
                             "MiB; give more memory, or export --to 3dtiles, tile by tile",
                             options.scene, triangles, bytes >> 20,
                             options.common.memory_budget_bytes >> 20));
+}
+
+/// A tile's samples in the DEM that the scene was built from, in the scene's frame.
+SampleGrid samples_of_tile(const DemWindows& source, const TileWindow& window) {
+  return place_window(source.dem(), source.read({window.first_column, window.first_row,
+                                                 window.columns, window.rows}));
+}
+
+/// Greatest distance of each triangle of a tile from the DEM that it was made of.
+/// Throws Error{kInput} where the DEM is another one.
+std::vector<double> triangle_errors_m(const ExportOptions& options, SceneTiles& scene,
+                                      std::size_t tile, const DemWindows& source) {
+  const auto refuse = [&](const std::string& found) {
+    throw Error(ErrorCode::kInput,
+                fmt::format("'{}': {}; the DEMs that '{}' was built from were expected, in the "
+                            "same order; leave --dem out for one error of all triangles",
+                            options.dem_files[0], found, options.scene));
+  };
+  const TileWindow window = scene.window_of({tile});
+  const SampleGrid grid = samples_of_tile(source, window);
+  Mesh mesh;
+  mesh.tin = scene.read_tin(tile);
+  mesh.sample_of_vertex =
+      read_sample_of_vertex(scene.scene().open(scene.scene().require(scene.tile(tile).id, "tin")));
+  for (std::size_t v = 0; v < mesh.tin.vertices.size(); ++v) {
+    std::int64_t& sample = mesh.sample_of_vertex[v];
+    if (sample < 0) refuse("has no samples where the scene has buildings");
+    const std::int64_t columns = source.dem().columns;
+    const std::int64_t column = sample % columns - window.first_column;
+    const std::int64_t row = sample / columns - window.first_row;
+    if (column < 0 || row < 0 || column >= window.columns || row >= window.rows)
+      refuse("its samples are not those of the scene");
+    sample = row * window.columns + column;
+    if (grid.positions[static_cast<std::size_t>(sample)] != mesh.tin.vertices[v])
+      refuse("its heights or its place are not those of the scene");
+  }
+  return measure_triangle_errors(grid, mesh);
+}
+
+/// The DEM of --dem, read as the scene says that it was.
+std::unique_ptr<DemWindows> open_source(const ExportOptions& options, const SceneTiles& scene) {
+  if (options.dem_files.empty()) return nullptr;
+  const SceneDescription& description = scene.scene().description();
+  DemOptions dem;
+  dem.earth = scene.frame().description().earth;
+  dem.refraction = description.earth.refraction;
+  dem.geoid_file = description.earth.geoid;
+  dem.height_unit = SceneReport(scene.scene()).height_unit();
+  auto source = std::make_unique<DemWindows>(options.dem_files, dem);
+  if (source->dem().columns != description.raster.columns ||
+      source->dem().rows != description.raster.rows)
+    throw Error(ErrorCode::kInput,
+                fmt::format("'{}': is of {} x {} samples; the DEMs that '{}' was built from were "
+                            "expected, {} x {} in all; leave --dem out for one error of all "
+                            "triangles",
+                            options.dem_files[0], source->dem().columns, source->dem().rows,
+                            options.scene, description.raster.columns, description.raster.rows));
+  return source;
 }
 
 /// The slopes under which a group is hidden from far cameras, as angles above the level, degrees:
@@ -69,6 +131,7 @@ FarHorizon far_horizon(const CertifiedRegions& regions, std::uint32_t group) {
 void export_ugrid(const ExportOptions& options, SceneTiles& scene, const PartFolder& folder,
                   Stages& stages, nlohmann::json& result) {
   check_memory(options, scene);
+  const std::unique_ptr<DemWindows> source = open_source(options, scene);
   MapMesh mesh;
   mesh.crs_wkt = scene.scene().description().crs_wkt;
   FaceValues mean{"horizon",
@@ -116,10 +179,20 @@ void export_ugrid(const ExportOptions& options, SceneTiles& scene, const PartFol
                             "were expected; build it again",
                             options.scene, mesh.group_of_triangle.size(), mesh.triangles.size()));
   const double error_m = SceneReport(scene.scene()).mesh_error_m();
-  mesh.values.push_back({"error",
-                         "greatest vertical distance of the mesh from its source, measured over "
-                         "all of the surface",
-                         "m", std::vector<double>(mesh.triangles.size(), error_m)});
+  FaceValues error{"error", "greatest vertical distance of the triangle from the source", "m", {}};
+  if (source) {
+    stages.run("errors", [&](const Progress& progress) {
+      for (std::size_t i = 0; i < scene.size(); ++i) {
+        const std::vector<double> own = triangle_errors_m(options, scene, i, *source);
+        error.values.insert(error.values.end(), own.begin(), own.end());
+        if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(scene.size()));
+      }
+    });
+  } else {
+    error.description = "greatest vertical distance of the mesh from the source, of all triangles";
+    error.values.assign(mesh.triangles.size(), error_m);
+  }
+  mesh.values.push_back(std::move(error));
   mesh.values.push_back(std::move(mean));
   mesh.values.push_back(std::move(least));
   stages.run("write", [&](const Progress&) {

@@ -207,6 +207,8 @@ struct ExportOptions {
   std::string output;     ///< a folder
   std::string to;         ///< name of an exporter (export.h)
   bool compress = false;  ///< 3dtiles
+  /// ugrid: what the scene was built from, for the error of each triangle; may be empty.
+  std::vector<std::string> dem_files;
 };
 
 /// Reads "X,Y[,H]". Throws Error{kUsage}.

@@ -27,6 +27,12 @@ void SceneReport::refuse(const std::string& reason) const {
                           path_, reason));
 }
 
+std::optional<std::string> SceneReport::height_unit() const {
+  const json parameters = report_.value("parameters", json::object());
+  if (!parameters.contains("height_unit") || !parameters["height_unit"].is_string()) return {};
+  return parameters["height_unit"].get<std::string>();
+}
+
 std::vector<double> SceneReport::level_errors_m(std::int32_t finest_level) const {
   std::vector<double> errors_m(static_cast<std::size_t>(finest_level) + 1, 0);
   errors_m.back() = mesh_error_m_;

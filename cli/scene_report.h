@@ -2,6 +2,9 @@
 
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "tiles/store/scene.h"
 
@@ -16,6 +19,10 @@ class SceneReport {
   /// Greatest vertical distance of the finest level from the source, measured over all of the
   /// surface, metres in the frame.
   double mesh_error_m() const { return mesh_error_m_; }
+
+  /// The unit that heights of the source were read in: m, ft or us-ft; nothing where it is not
+  /// told.
+  std::optional<std::string> height_unit() const;
 
   /// How far each level may lie from the source, from the root on, metres in the frame. A level is
   /// never better than a finer one; one without ground (near the root of long rasters) counts as

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <ogrsf_frmts.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -40,7 +41,7 @@ std::vector<std::int16_t> dem_row(int row) {
   return heights;
 }
 
-std::string write_dem(const std::string& path) {
+std::string write_dem(const std::string& path, int raised_m = 0) {
   GDALAllRegister();
   GDALDataset* dataset = GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
       path.c_str(), kColumns, kRows, 1, GDT_Int16, nullptr);
@@ -51,6 +52,7 @@ std::string write_dem(const std::string& path) {
   dataset->SetSpatialRef(&crs);
   for (int row = 0; row < kRows; ++row) {
     std::vector<std::int16_t> heights = dem_row(row);
+    for (std::int16_t& h : heights) h = static_cast<std::int16_t>(h + raised_m);
     EXPECT_EQ(dataset->GetRasterBand(1)->RasterIO(GF_Write, 0, row, kColumns, 1, heights.data(),
                                                   kColumns, 1, GDT_Int16, 0, 0),
               CE_None);
@@ -191,6 +193,22 @@ TEST_F(Export, TilesOfALevelMeetWithoutCracks) {
     }
   }
   EXPECT_GT(shared, 100U);
+}
+
+TEST_F(Export, TilesOfALevelMeetWithTheSameNormals) {
+  std::map<std::array<double, 3>, std::array<float, 3>> normals;
+  std::size_t met = 0;
+  for (const Tile& tile : finest_tiles(tileset())) {
+    std::map<std::array<double, 3>, std::array<float, 3>> own;
+    for (std::size_t v = 0; v < tile.glb.positions.size(); ++v)
+      own[tile.glb.vertex(v)] = tile.glb.normals[v];
+    for (const auto& [place, normal] : own) {
+      const auto [at, is_new] = normals.try_emplace(place, normal);
+      met += !is_new;
+      EXPECT_EQ(at->second, normal);
+    }
+  }
+  EXPECT_GT(met, 100U);
 }
 
 TEST_F(Export, GroupsAreThoseOfTheScene) {
@@ -343,6 +361,45 @@ TEST_F(Export, UgridIsOneMeshWithItsDatasets) {
   }
   EXPECT_GT(file.variables.at("error").values[0], 0);
   EXPECT_LE(file.variables.at("error").values[0], 1);
+}
+
+/// With the DEM at hand the error is each triangle's own: the greatest is the scene's, and samples
+/// within a triangle lie no farther from it.
+TEST_F(Export, UgridMeasuresEachTriangleAgainstItsDem) {
+  const std::string out = folder_->path("ugrid-errors");
+  built("$SCARP export " + scene() + " --to ugrid --dem " + folder_->path("dem.tif") + " -o " +
+        out);
+  const test::ReadNetcdf file = test::read_netcdf(out + "/mesh.nc");
+  const std::vector<double>& errors = file.variables.at("error").values;
+  const double whole_m =
+      read_json(scene() + "/report.json")["mesh"]["error_over_surface_m"].get<double>();
+  EXPECT_NEAR(*std::max_element(errors.begin(), errors.end()), whole_m, 1e-6);
+  EXPECT_LT(*std::min_element(errors.begin(), errors.end()), whole_m / 2);
+  const auto& x = file.variables.at("mesh2d_node_x").values;
+  const auto& y = file.variables.at("mesh2d_node_y").values;
+  const auto& z = file.variables.at("mesh2d_node_z").values;
+  const auto& corners = file.variables.at("mesh2d_face_nodes").values;
+  std::size_t compared = 0;
+  for (std::size_t t = 0; t < errors.size(); ++t) {
+    // The middle of a side that runs along a row over two cells is a sample.
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto a = static_cast<std::size_t>(corners[3 * t + i]);
+      const auto b = static_cast<std::size_t>(corners[3 * t + (i + 1) % 3]);
+      if (std::abs(y[a] - y[b]) > 0.01 || std::abs(std::abs(x[a] - x[b]) - 2 * kCellM) > 0.01)
+        continue;
+      const auto column = std::lround(((x[a] + x[b]) / 2 - kLeft) / kCellM - 0.5);
+      const auto row = static_cast<int>(std::lround((kTop - y[a]) / kCellM - 0.5));
+      const double sample_m = dem_row(row)[static_cast<std::size_t>(column)];
+      EXPECT_LE(std::abs(sample_m - (z[a] + z[b]) / 2), errors[t] + 0.01);
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 50U);
+  const RunResult other =
+      run_scarp("$SCARP export " + one_tile() + " --to ugrid --dem " +
+                write_dem(folder_->path("other.tif"), 1) + " -o " + folder_->path("refused"));
+  EXPECT_EQ(other.exit_code, 1);
+  EXPECT_NE(other.errors.find("not those of the scene"), std::string::npos) << other.errors;
 }
 
 }  // namespace

@@ -18,11 +18,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Least radius of curvature of WGS 84, b^2 / a, less the depth of any ground: metres.
 constexpr double kLeastRadiusM = 6.32e6;
 
-struct PlacedGround {
-  std::vector<TilePoint> points;  ///< of whole steps
-  std::vector<std::array<float, 3>> normals;
-};
-
 std::vector<TilePoint> points_of(std::span<const EcefPoint> ecef, const TilesetFrame& frame,
                                  double step_m) {
   std::vector<TilePoint> points;
@@ -31,8 +26,8 @@ std::vector<TilePoint> points_of(std::span<const EcefPoint> ecef, const TilesetF
   return points;
 }
 
-/// Normals of vertices, each triangle counting by its area.
-std::vector<std::array<float, 3>> normals_of(const Tin& tin, const std::vector<TilePoint>& points) {
+/// Sums of the normals around each vertex, each triangle counting by its area.
+std::vector<TilePoint> normal_sums(const Tin& tin, const std::vector<TilePoint>& points) {
   std::vector<TilePoint> sums(points.size());
   for (const auto& [a, b, c] : tin.triangles) {
     TilePoint u, v;
@@ -45,6 +40,33 @@ std::vector<std::array<float, 3>> normals_of(const Tin& tin, const std::vector<T
     for (const VertexIndex vertex : {a, b, c})
       for (std::size_t i = 0; i < 3; ++i) sums[vertex][i] += n[i];
   }
+  return sums;
+}
+
+/// Calls take(vertex) for the ends of border edges, more than once.
+template <class Take>
+void for_border_vertices(const Tin& tin, const Take& take) {
+  for (std::size_t t = 0; t < tin.triangles.size(); ++t) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (tin.neighbours[t][i] != kNone) continue;
+      take(tin.triangles[t][(i + 1) % 3]);
+      take(tin.triangles[t][(i + 2) % 3]);
+    }
+  }
+}
+
+std::array<double, 3> key_of(const Position& p) {
+  return {p.x_m, p.y_m, p.z_m};
+}
+
+std::vector<std::array<float, 3>> normals_of(const Tin& tin, const std::vector<TilePoint>& points,
+                                             const BorderNormals& around) {
+  std::vector<TilePoint> sums = normal_sums(tin, points);
+  if (!around.empty())
+    for_border_vertices(tin, [&](VertexIndex v) {
+      const auto found = around.find(key_of(tin.vertices[v]));
+      if (found != around.end()) sums[v] = found->second;
+    });
   std::vector<std::array<float, 3>> normals;
   normals.reserve(sums.size());
   for (const TilePoint& n : sums) {
@@ -128,11 +150,11 @@ double longest_side_m(const std::array<VertexIndex, 3>& corners, std::span<const
 class GroundBuilder {
  public:
   GroundBuilder(const Tin& tin, std::span<const EcefPoint> ecef, std::vector<TilePoint> points,
-                double step_m)
+                double step_m, const BorderNormals& around)
       : tin_(tin),
         ecef_(ecef),
         points_(std::move(points)),
-        normals_(normals_of(tin, points_)),
+        normals_(normals_of(tin, points_, around)),
         new_vertex_(tin.vertices.size(), kNone) {
     TilePoint low = points_[0], high = points_[0];
     for (const TilePoint& p : points_) {
@@ -210,10 +232,20 @@ class GroundBuilder {
 
 }  // namespace
 
+BorderNormals border_normals(const Tin& tin, std::span<const EcefPoint> ecef,
+                             const TilesetFrame& frame, double step_m) {
+  const std::vector<TilePoint> sums = normal_sums(tin, points_of(ecef, frame, step_m));
+  BorderNormals border;
+  for_border_vertices(tin,
+                      [&](VertexIndex v) { border.try_emplace(key_of(tin.vertices[v]), sums[v]); });
+  return border;
+}
+
 TerrainMesh tile_ground(const Tin& tin, std::span<const EcefPoint> ecef, const TilesetFrame& frame,
-                        const Groups* groups, GroupIndex first_group, double step_m) {
+                        const Groups* groups, GroupIndex first_group, double step_m,
+                        const BorderNormals& around) {
   assert(!tin.triangles.empty() && ecef.size() == tin.vertices.size());
-  GroundBuilder builder(tin, ecef, points_of(ecef, frame, step_m), step_m);
+  GroundBuilder builder(tin, ecef, points_of(ecef, frame, step_m), step_m, around);
   const std::vector<TriangleIndex> order = by_group(tin, groups);
   if (groups == nullptr) {
     builder.add(order, kNone);

@@ -35,7 +35,7 @@ TileHorizon horizon_of_nothing(double centre_x_m, double centre_y_m, double heig
 
 /// Has a horizon hold for groups too, which lie within its circle.
 /// Side: never more hidden than the groups' regions say.
-/// Cost: about 20 us a group.
+/// Cost: tens of microseconds a group.
 void cover_groups(const CertifiedRegions& regions, TileHorizon& horizon);
 
 /// Has it hold for ground of which nothing is known.
