@@ -10,9 +10,21 @@
 #include "cli/outputs.h"
 #include "cli/scene_tiles.h"
 #include "cli/stages.h"
+#include "core/error/error.h"
 
 namespace scarp {
 namespace {
+
+/// Throws Error{kUsage} for an option that the format has no use for.
+void check_used(const ExportOptions& options) {
+  const auto refuse = [&](const char* option, const char* format) {
+    throw Error(ErrorCode::kUsage, fmt::format("{} is for --to {}, and --to {} was given; leave it "
+                                               "out",
+                                               option, format, options.to));
+  };
+  if (options.compress && options.to != "3dtiles") refuse("--compress", "3dtiles");
+  if (!options.dem_files.empty() && options.to != "ugrid") refuse("--dem", "ugrid");
+}
 
 constexpr std::array kExporters = {
     Exporter{"3dtiles", "a tileset of 3D Tiles 1.1", "tileset.json", export_tileset},
@@ -35,6 +47,7 @@ const Exporter* find_exporter(std::string_view name) {
 
 int run_export(const ExportOptions& options) {
   const Exporter& exporter = *find_exporter(options.to);
+  check_used(options);
   SceneTiles scene(options.scene);
   PartFolder folder(options.output, exporter.mark, existing(options.common));
   Stages stages(!options.common.json);

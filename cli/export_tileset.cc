@@ -73,7 +73,8 @@ class TilesetExport {
         pyramid_(scene.scene().description()),
         errors_m_(SceneReport(scene.scene()).level_errors_m(pyramid_.finest_level)),
         globe_(scene.frame()),
-        frame_(tileset_frame()) {
+        frame_(tileset_frame()),
+        steps_m_(steps_of_levels()) {
     for (std::size_t i = 0; i < scene.size(); ++i) number_of_tile_[tile_id(scene.tile(i))] = i;
     has_horizons_ = has_certified();
     for (const auto& [id, tile] : pyramid_.with_mesh) hold_bounds(id, *tile->contents);
@@ -94,7 +95,7 @@ class TilesetExport {
     result["levels"] = pyramid_.finest_level + 1;
     result["triangles"] = triangles_;
     result["content_bytes"] = content_bytes_;
-    result["position_error_m"] = step_m(pyramid_.finest_level) / 2;
+    result["position_error_m"] = steps_m_.back() / 2;
   }
 
  private:
@@ -143,20 +144,21 @@ class TilesetExport {
     }
   }
 
-  /// From a tile's bounds in the frame: half their diagonal, and what verticals lean and the Earth
-  /// bends over that.
-  double step_m(std::int32_t level) const {
-    double reach_m = 0;
-    for (const TileId& id : pyramid_.level(level)) {
-      const TileContents& bounds = *pyramid_.with_mesh.at(id)->contents;
-      reach_m = std::max(reach_m, half_size_m(bounds));
+  /// Of each level, by its largest tile.
+  std::vector<double> steps_of_levels() const {
+    const Globe::Placer globe(globe_);
+    std::vector<double> reach_m(static_cast<std::size_t>(pyramid_.finest_level) + 1, 0);
+    for (const auto& [id, tile] : pyramid_.with_mesh) {
+      double& most_m = reach_m[static_cast<std::size_t>(id.level)];
+      most_m = std::max(most_m, half_size_m(globe, *tile->contents));
     }
-    return step_for(reach_m);
+    std::vector<double> steps_m;
+    for (const double reach : reach_m) steps_m.push_back(step_for(reach));
+    return steps_m;
   }
 
   /// Half of the largest side of a tile in the tileset's axes, by the corners of its bounds.
-  double half_size_m(const TileContents& bounds) const {
-    const Globe::Placer globe(globe_);
+  double half_size_m(const Globe::Placer& globe, const TileContents& bounds) const {
     TilePoint low{HUGE_VAL, HUGE_VAL, HUGE_VAL}, high{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
     for (const double x : {bounds.low[0], bounds.high[0]}) {
       for (const double y : {bounds.low[1], bounds.high[1]}) {
@@ -193,7 +195,7 @@ class TilesetExport {
   void write_level(std::int32_t level, const Progress& progress) {
     const std::vector<TileId> ids = pyramid_.level(level);
     const std::size_t at_once = tiles_at_once();
-    const double step = ids.empty() ? 0 : step_m(level);
+    const double step = steps_m_[static_cast<std::size_t>(level)];
     const BorderNormals around =
         ids.size() > 1 ? normals_between(ids, at_once, step) : BorderNormals{};
     for (std::size_t begin = 0; begin < ids.size(); begin += at_once) {
@@ -397,7 +399,7 @@ class TilesetExport {
                           globe_.datum_shift_accuracy_m() < 0
                               ? "accuracy unknown"
                               : fmt::format("accurate to {:g} m", globe_.datum_shift_accuracy_m()));
-    tileset.position_error_m = step_m(pyramid_.finest_level) / 2;
+    tileset.position_error_m = steps_m_.back() / 2;
     tileset.refraction = frame.refraction;
     tileset.frame_origin = earth.frame.origin();
     tileset.frame_centre = earth.frame.unflatten({});
@@ -420,6 +422,7 @@ class TilesetExport {
   const std::vector<double> errors_m_;  // of levels
   const Globe globe_;
   const TilesetFrame frame_;
+  const std::vector<double> steps_m_;  // of levels
   bool has_horizons_ = false;
   std::map<TileId, std::size_t> number_of_tile_;
   std::map<TileId, TileContents> bounds_;

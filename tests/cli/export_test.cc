@@ -278,6 +278,7 @@ TEST_F(Export, RefusesInOneLineAndLeavesNothing) {
   EXPECT_EQ(memory.exit_code, 1);
   EXPECT_NE(memory.errors.find("--memory is 1 MiB"), std::string::npos) << memory.errors;
   EXPECT_EQ(run_scarp("$SCARP export " + scene() + " --to obj -o " + out).exit_code, 2);
+  EXPECT_EQ(run_scarp("$SCARP export " + scene() + " --to gpkg --compress -o " + out).exit_code, 2);
   const RunResult there = run_scarp("$SCARP export " + scene() + " --to 3dtiles -o " + tileset());
   EXPECT_EQ(there.exit_code, 1);
   EXPECT_NE(there.errors.find("--overwrite"), std::string::npos);

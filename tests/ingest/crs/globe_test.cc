@@ -4,8 +4,10 @@
 #include <ogr_spatialref.h>
 
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <random>
+#include <utility>
 
 #include "core/error/error.h"
 
@@ -84,6 +86,22 @@ TEST(Globe, AnotherDatumIsShifted) {
     beside.x_m += 1;
     EXPECT_NEAR(distance_m(on_globe.ecef(beside), shifted),
                 distance_m(own.unflatten(beside), own.unflatten(p)), 1e-4);
+  }
+}
+
+/// Heights above the geoid: PROJ's own conversion from EGM96 heights comes to the same place.
+TEST(Globe, UndulationsAreAddedOnWgs84AndElsewhere) {
+  const std::string egm96 = "/usr/share/proj/egm96_15.gtx";
+  if (!std::filesystem::exists(egm96)) GTEST_SKIP() << "left out, proj-data not found: " << egm96;
+  const MapPoint at{8.65, 46.55, 1200};
+  // WGS 84, and ETRS89, which goes the long way round and lies within a metre of it.
+  for (const auto& [crs, away_m] : {std::pair{"EPSG:4326", 0.01}, std::pair{"EPSG:4258", 1.0}}) {
+    FrameDescription description = frame_at(crs, at.x, at.y);
+    description.geoid_file = egm96;
+    const GeoFrame frame(description);
+    const Globe globe(frame);
+    const EcefPoint placed = Globe::Placer(globe).ecef(GeoFrame::Placer(frame).place(at));
+    EXPECT_LT(distance_m(placed, by_proj("EPSG:4326+5773", at)), away_m) << crs;
   }
 }
 
