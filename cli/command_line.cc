@@ -446,8 +446,8 @@ void add_fly(CLI::App& app, FlyOptions& o, std::function<int()>& run) {
   c->add_option("--seed", o.seed, "Where such a path begins; 1 unless given")->excludes(path);
   c->add_option("--methods", o.methods, "Some of them only, separated by commas")
       ->delimiter(',')
-      ->check(CLI::IsMember({"frustum", "thesis", "certified", "cells", "law-tan", "hzb", "mask", "hom",
-                             "hom-0.7", "lod-query", "multi-frame", "stop-and-wait"}));
+      ->check(CLI::IsMember({"frustum", "thesis", "certified", "cells", "law-tan", "hzb", "mask",
+                             "hom", "hom-0.7", "lod-query", "multi-frame", "stop-and-wait"}));
   c->add_option("--width", o.width_px, "Of the pictures, pixels, 16:9; 640 unless given")
       ->check(CLI::Range(16, 8192));
   c->add_option("--field-of-view", o.field_of_view_deg, "Vertical, degrees; 45 unless given")
@@ -517,7 +517,8 @@ void add_vdb_options(CLI::App& command, ExportOptions& o) {
 void add_export(CLI::App& app, ExportOptions& o, std::function<int()>& run) {
   CLI::App* c = app.add_subcommand("export", "Write a scene for simulators and GIS");
   c->footer(
-      "Examples:\n  scarp export alps.scene --to groups -o alps-groups\n"
+      "Examples:\n  scarp export alps.scene --to 3dtiles -o alps-tiles\n"
+      "  scarp export alps.scene --to groups -o alps-groups\n"
       "  scarp export alps.scene --to vdb -o alps-cells --altitudes 2,50,300,1000\n"
       "  scarp export alps.scene --to vdb -o alps-seen --observer 8.65,46.55,300 --crs OGC:CRS84");
   c->add_option("scene", o.scene, "A scene")->required();
@@ -529,6 +530,11 @@ void add_export(CLI::App& app, ExportOptions& o, std::function<int()>& run) {
     return find_exporter(text) != nullptr ? "" : text + " is not a format that is known";
   });
   add_vdb_options(*c, o);
+  c->add_flag("--compress", o.compress,
+              "3dtiles: meshes as EXT_meshopt_compression, a third of the bytes");
+  c->add_option("--dem", o.dem_files,
+                "ugrid: the DEMs that the scene was built from, for the error of each triangle; "
+                "without them all have the greatest one");
   add_common(*c, o.common);
   c->callback([&] { run = [&o] { return run_export(o); }; });
 }

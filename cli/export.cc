@@ -26,11 +26,17 @@ void check_used(const ExportOptions& options) {
   if (options.observer && !is_vdb) refuse("--observer", "vdb");
   if (!options.altitudes_m.empty() && !is_vdb) refuse("--altitudes", "vdb");
   if (options.cell_m && !is_vdb) refuse("--cell", "vdb");
+  if (options.compress && options.to != "3dtiles") refuse("--compress", "3dtiles");
+  if (!options.dem_files.empty() && options.to != "ugrid") refuse("--dem", "ugrid");
 }
 
 constexpr std::array kExporters = {
+    Exporter{"3dtiles", "a tileset of 3D Tiles 1.1", "tileset.json", export_tileset},
     Exporter{"groups", "what a simulator culls groups by", "groups.scarp", export_groups},
     Exporter{"vdb", "view cells of the airspace as OpenVDB", "cells.vdb", export_vdb},
+    Exporter{"gpkg", "groups as polygons, a GeoPackage", "groups.gpkg", export_geopackage},
+    Exporter{"ugrid", "the mesh as UGRID netCDF, with its groups, error and horizons", "mesh.nc",
+             export_ugrid},
 };
 
 }  // namespace

@@ -33,5 +33,11 @@ void export_groups(const ExportOptions& options, SceneTiles& scene, const PartFo
                    Stages& stages, nlohmann::json& result);
 void export_vdb(const ExportOptions& options, SceneTiles& scene, const PartFolder& folder,
                 Stages& stages, nlohmann::json& result);
+void export_tileset(const ExportOptions& options, SceneTiles& scene, const PartFolder& folder,
+                    Stages& stages, nlohmann::json& result);
+void export_geopackage(const ExportOptions& options, SceneTiles& scene, const PartFolder& folder,
+                       Stages& stages, nlohmann::json& result);
+void export_ugrid(const ExportOptions& options, SceneTiles& scene, const PartFolder& folder,
+                  Stages& stages, nlohmann::json& result);
 
 }  // namespace scarp

@@ -222,6 +222,9 @@ struct ExportOptions {
       altitudes_m;               ///< above ground, where bands end; empty: those of export_vdb.cc
   std::optional<double> cell_m;  ///< side of a view cell
   double keep = 0.95;            ///< of the members of sets, where cells share one
+  bool compress = false;         ///< 3dtiles
+  /// ugrid: what the scene was built from, for the error of each triangle; may be empty.
+  std::vector<std::string> dem_files;
 };
 
 /// Reads "X,Y[,H]". Throws Error{kUsage}.

@@ -4,8 +4,8 @@
 
 namespace scarp {
 
-EllipsoidNormal ellipsoid_normal(const EarthFrame& earth, const EcefPoint& point) {
-  const double a = earth.semi_major_m, b = a * (1 - earth.flattening);
+EllipsoidNormal ellipsoid_normal(const Ellipsoid& earth, const EcefPoint& point) {
+  const double a = earth.semi_major_m, b = earth.semi_minor_m();
   const double e2 = earth.flattening * (2 - earth.flattening);
   const double second_e2 = e2 / (1 - e2);
   const double from_axis = std::hypot(point.x_m, point.y_m);

@@ -43,6 +43,9 @@ class Flattening {
   /// Cosine of the angle between a point and the centre, seen from the origin.
   double cosine_from_centre(const EcefPoint& point) const;
 
+  /// Where the verticals meet.
+  const EcefPoint& origin() const { return origin_; }
+
   /// The inverse, for what leaves the program. Exact up to rounding.
   EcefPoint unflatten(const Position& p) const;
 

@@ -1,7 +1,6 @@
 #include "ingest/crs/geo_frame.h"
 
 #include <fmt/format.h>
-#include <proj.h>
 
 #include <GeographicLib/Geocentric.hpp>
 #include <GeographicLib/Geodesic.hpp>
@@ -12,6 +11,7 @@
 #include "core/error/error.h"
 #include "core/geodesy/flattening.h"
 #include "ingest/crs/geoid.h"
+#include "ingest/crs/proj_objects.h"
 
 namespace scarp {
 namespace {
@@ -21,42 +21,11 @@ constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 /// Least cosine of the angle between a point and the scene's centre: 87 degrees.
 constexpr double kLeastCosine = 0.0523;
 
-struct DestroyPj {
-  void operator()(PJ* pj) const { proj_destroy(pj); }
-};
-struct DestroyContext {
-  void operator()(PJ_CONTEXT* context) const { proj_context_destroy(context); }
-};
-using PjPtr = std::unique_ptr<PJ, DestroyPj>;
-using ContextPtr = std::unique_ptr<PJ_CONTEXT, DestroyContext>;
-
-ContextPtr make_context() {
-  ContextPtr context(proj_context_create());
-  proj_log_level(context.get(), PJ_LOG_NONE);
-  proj_context_set_enable_network(context.get(), 0);
-  return context;
-}
-
 [[noreturn]] void refuse_crs(const std::string& found) {
   throw Error(ErrorCode::kInput,
               fmt::format("coordinate system {}: cannot be placed on the Earth; a projected or "
                           "geographic CRS was expected; give --earth flat to use the map plane",
                           found));
-}
-
-/// The horizontal part of a CRS, without a bound transformation to another datum.
-PjPtr horizontal_crs(PJ_CONTEXT* context, const std::string& crs) {
-  PjPtr pj(proj_create(context, crs.c_str()));
-  while (pj) {
-    const PJ_TYPE type = proj_get_type(pj.get());
-    if (type == PJ_TYPE_BOUND_CRS)
-      pj.reset(proj_get_source_crs(context, pj.get()));
-    else if (type == PJ_TYPE_COMPOUND_CRS)
-      pj.reset(proj_crs_get_sub_crs(context, pj.get(), 0));
-    else
-      break;
-  }
-  return pj;
 }
 
 std::string name_of(PJ* pj) {
@@ -98,7 +67,7 @@ GeoFrame::GeoFrame(const FrameDescription& description) : description_(descripti
     throw Error(ErrorCode::kInput,
                 fmt::format("refraction {}: outside [0, 1]; 0 is none, 0.13 light, 0.25 radio",
                             description.refraction));
-  const ContextPtr context = make_context();
+  const ContextPtr context = make_proj_context();
   PjPtr crs;
   if (!description.crs_wkt.empty()) crs = horizontal_crs(context.get(), description.crs_wkt);
   const PJ_TYPE type = crs ? proj_get_type(crs.get()) : PJ_TYPE_UNKNOWN;
@@ -183,7 +152,7 @@ std::optional<EarthFrame> GeoFrame::earth_frame() const {
 GeoFrame::Placer::Placer(const GeoFrame& frame) : impl_(std::make_unique<Impl>()) {
   impl_->frame = &frame;
   if (frame.description_.earth == Earth::kFlat) return;
-  impl_->context = make_context();
+  impl_->context = make_proj_context();
   PJ_CONTEXT* context = impl_->context.get();
   const PjPtr crs = horizontal_crs(context, frame.description_.crs_wkt);
   const PjPtr geodetic(proj_crs_get_geodetic_crs(context, crs.get()));
@@ -293,7 +262,7 @@ double GeoFrame::Placer::plane_direction_rad(const MapPoint& from, double azimut
 
 MapPoint convert_coordinates(const std::string& from_crs, const std::string& to_crs,
                              const MapPoint& point) {
-  const ContextPtr context = make_context();
+  const ContextPtr context = make_proj_context();
   const PjPtr from = horizontal_crs(context.get(), from_crs);
   const PjPtr to = horizontal_crs(context.get(), to_crs);
   if (!from || !to)

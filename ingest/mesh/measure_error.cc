@@ -65,7 +65,11 @@ double distance_m(const Corners& one, const Corners& other) {
 class Judge {
  public:
   Judge(const SampleGrid& grid, const Mesh& mesh)
-      : grid_(grid), mesh_(mesh), vertex_(grid.positions.size(), 0), seen_(vertex_) {
+      : grid_(grid),
+        mesh_(mesh),
+        vertex_(grid.positions.size(), 0),
+        seen_(vertex_),
+        of_triangle_m_(mesh.tin.triangles.size(), 0) {
     for (const std::int64_t sample : mesh.sample_of_vertex)
       vertex_[static_cast<std::size_t>(sample)] = 1;
   }
@@ -78,7 +82,13 @@ class Judge {
     return found_;
   }
 
+  std::vector<double> of_triangles_m() && { return std::move(of_triangle_m_); }
+
  private:
+  void note(std::size_t triangle, double error_m) {
+    of_triangle_m_[triangle] = std::max(of_triangle_m_[triangle], error_m);
+  }
+
   Place place(std::size_t triangle, std::size_t corner) const {
     const std::int64_t sample = mesh_.sample_of_vertex[mesh_.tin.triangles[triangle][corner]];
     return {sample % grid_.columns, sample / grid_.columns};
@@ -105,21 +115,22 @@ class Judge {
     const std::int64_t last_row = std::min<std::int64_t>(high.row + beyond, grid_.rows - 1);
     for (std::int64_t r = std::max<std::int64_t>(low.row - beyond, 0); r <= last_row; ++r) {
       for (std::int64_t c = std::max<std::int64_t>(low.column - beyond, 0); c <= last_column; ++c) {
-        judge_sample(t, static_cast<std::int32_t>(c), static_cast<std::int32_t>(r));
+        judge_sample(triangle, t, static_cast<std::int32_t>(c), static_cast<std::int32_t>(r));
         if (grid_.is_ground_cell(static_cast<std::int32_t>(c), static_cast<std::int32_t>(r)))
           judge_cell(triangle, t, static_cast<std::int32_t>(c), static_cast<std::int32_t>(r));
       }
     }
   }
 
-  void judge_sample(const Corners& t, std::int32_t c, std::int32_t r) {
+  void judge_sample(std::size_t triangle, const Corners& t, std::int32_t c, std::int32_t r) {
     if (!is_ground_sample(c, r)) return;
     const Position& p = grid_.at(c, r);
     for (std::size_t i = 0; i < 3; ++i)
       if (orient2d(t[i], t[(i + 1) % 3], p) < 0) return;
     seen_[grid_.index(c, r)] = 1;
-    found_.at_samples_m =
-        std::max(found_.at_samples_m, std::abs(p.z_m - height_m(t, p.x_m, p.y_m)));
+    const double error_m = std::abs(p.z_m - height_m(t, p.x_m, p.y_m));
+    found_.at_samples_m = std::max(found_.at_samples_m, error_m);
+    note(triangle, error_m);
   }
 
   void judge_cell(std::size_t triangle, const Corners& t, std::int32_t c, std::int32_t r) {
@@ -135,9 +146,12 @@ class Judge {
     for (const Corners& half :
          {Corners{nw, sw, ne}, Corners{ne, sw, se}, Corners{nw, sw, se}, Corners{nw, se, ne}})
       worst_m = std::max(worst_m, distance_m(t, half));
-    double& found_m =
-        fills_resolved_cell(triangle, c, r) ? found_.cell_ambiguity_m : found_.over_surface_m;
-    found_m = std::max(found_m, worst_m);
+    if (fills_resolved_cell(triangle, c, r)) {
+      found_.cell_ambiguity_m = std::max(found_.cell_ambiguity_m, worst_m);
+      return;
+    }
+    found_.over_surface_m = std::max(found_.over_surface_m, worst_m);
+    note(triangle, worst_m);
   }
 
   /// Whether a triangle is one half of a cell whose four corners are vertices.
@@ -166,8 +180,9 @@ class Judge {
         if (seen_[grid_.index(c, r)]) continue;
         seen_[grid_.index(c, r)] = 1;
         const Position &p = grid_.at(c, r), &from = t[(i + 1) % 3], &to = t[(i + 2) % 3];
-        found_.at_samples_m =
-            std::max(found_.at_samples_m, std::abs(p.z_m - height_m(t, p.x_m, p.y_m)));
+        const double error_m = std::abs(p.z_m - height_m(t, p.x_m, p.y_m));
+        found_.at_samples_m = std::max(found_.at_samples_m, error_m);
+        note(triangle, error_m);
         const double gap_m =
             -side(from, to, p.x_m, p.y_m) / std::hypot(to.x_m - from.x_m, to.y_m - from.y_m);
         found_.border_gap_cells =
@@ -190,6 +205,7 @@ class Judge {
   const SampleGrid& grid_;
   const Mesh& mesh_;
   std::vector<std::uint8_t> vertex_, seen_;
+  std::vector<double> of_triangle_m_;
   MeasuredError found_;
 };
 
@@ -197,6 +213,12 @@ class Judge {
 
 MeasuredError measure_error(const SampleGrid& grid, const Mesh& mesh) {
   return Judge(grid, mesh).run();
+}
+
+std::vector<double> measure_triangle_errors(const SampleGrid& grid, const Mesh& mesh) {
+  Judge judge(grid, mesh);
+  judge.run();
+  return std::move(judge).of_triangles_m();
 }
 
 }  // namespace scarp

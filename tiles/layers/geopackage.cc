@@ -61,7 +61,7 @@ OGRFeatureUniquePtr feature_of(const GroupPolygon& group, OGRLayer& layer) {
   return feature;
 }
 
-void fill_layer(GDALDataset& dataset, std::span<const GroupPolygon> groups,
+void fill_layer(GDALDataset& dataset, const std::function<void(const TakeGroups&)>& give,
                 OGRSpatialReference* crs, const GdalSession& session, const std::string& path) {
   if (dataset.StartTransaction() != OGRERR_NONE) session.fail(path);
   OGRLayer* layer = dataset.CreateLayer("groups", crs, wkbMultiPolygon, nullptr);
@@ -70,9 +70,10 @@ void fill_layer(GDALDataset& dataset, std::span<const GroupPolygon> groups,
     OGRFieldDefn definition(field.name, field.type);
     if (layer->CreateField(&definition) != OGRERR_NONE) session.fail(path);
   }
-  for (const GroupPolygon& group : groups) {
-    if (layer->CreateFeature(feature_of(group, *layer).get()) != OGRERR_NONE) session.fail(path);
-  }
+  give([&](std::span<const GroupPolygon> groups) {
+    for (const GroupPolygon& group : groups)
+      if (layer->CreateFeature(feature_of(group, *layer).get()) != OGRERR_NONE) session.fail(path);
+  });
   if (dataset.CommitTransaction() != OGRERR_NONE) session.fail(path);
 }
 
@@ -153,9 +154,16 @@ void write_geopackage(const std::string& path, const std::string& crs_wkt, Exist
 
 void write_group_polygons(const std::string& path, std::span<const GroupPolygon> groups,
                           const std::string& crs_wkt, Existing existing) {
+  write_group_polygons_in_pieces(
+      path, [&](const TakeGroups& take) { take(groups); }, crs_wkt, existing);
+}
+
+void write_group_polygons_in_pieces(const std::string& path,
+                                    const std::function<void(const TakeGroups&)>& give,
+                                    const std::string& crs_wkt, Existing existing) {
   write_geopackage(path, crs_wkt, existing,
                    [&](GDALDataset& dataset, OGRSpatialReference* crs, const GdalSession& session) {
-                     fill_layer(dataset, groups, crs, session, path);
+                     fill_layer(dataset, give, crs, session, path);
                    });
 }
 

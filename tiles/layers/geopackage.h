@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -42,6 +43,15 @@ struct GroupPolygon {
 /// beside the polygons.
 void write_group_polygons(const std::string& path, std::span<const GroupPolygon> groups,
                           const std::string& crs_wkt, Existing existing);
+
+/// Takes some of the groups.
+using TakeGroups = std::function<void(std::span<const GroupPolygon>)>;
+
+/// The same for groups that are never held all at once: `give` hands them over in pieces.
+/// Memory: the file, and a piece. Errors: as above, and what `give` throws.
+void write_group_polygons_in_pieces(const std::string& path,
+                                    const std::function<void(const TakeGroups&)>& give,
+                                    const std::string& crs_wkt, Existing existing);
 
 /// Writes the outlines of what a raster of whole numbers shows: the layer "areas" of a GeoPackage,
 /// a polygon for each piece of cells of one value that hang together by edges, with the field

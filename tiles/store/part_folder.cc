@@ -41,6 +41,17 @@ PartFolder::~PartFolder() {
   if (!is_committed_) fs::remove_all(part_path_, ignored);
 }
 
+std::string PartFolder::path_for(const std::string& name) const {
+  const fs::path path = fs::path(part_path_) / name;
+  std::error_code failure;
+  fs::create_directories(path.parent_path(), failure);
+  if (failure)
+    throw Error(ErrorCode::kResource,
+                fmt::format("'{}': cannot be made ({}); room on the disk was expected",
+                            path.parent_path().string(), failure.message()));
+  return path.string();
+}
+
 void PartFolder::write(const std::string& name, std::span<const std::byte> bytes) const {
   write_file(path_for(name), bytes, Existing::kRefuse);
 }

@@ -21,8 +21,8 @@ class PartFolder {
   PartFolder(const PartFolder&) = delete;
   PartFolder& operator=(const PartFolder&) = delete;
 
-  /// Where to write a file of the folder, which has no folders of its own.
-  std::string path_for(const std::string& name) const { return part_path_ + "/" + name; }
+  /// Where to write a file of the folder; the folders in its name are made.
+  std::string path_for(const std::string& name) const;
 
   void write(const std::string& name, std::span<const std::byte> bytes) const;
   void write(const std::string& name, const std::string& text) const {
