@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -14,6 +13,7 @@
 #include "cli/outputs.h"
 #include "cli/progress_bar.h"
 #include "cli/scene_culling.h"
+#include "cli/stage_clock.h"
 #include "cli/verify.h"
 #include "core/culling/certified_culling.h"
 #include "core/culling/visible_groups.h"
@@ -53,15 +53,6 @@ struct JudgedEye {
   std::size_t height;
   Position eye;
   std::vector<TriangleSight> sight;
-};
-
-class Stopwatch {
- public:
-  double seconds() const { return std::chrono::duration<double>(Clock::now() - begun_).count(); }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  Clock::time_point begun_ = Clock::now();
 };
 
 std::int64_t whole_parameter(const SceneDescription& scene, const char* name,
