@@ -1,10 +1,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <numeric>
+#include <optional>
 
 #include "cli/commands.h"
 #include "cli/fly/flight.h"
@@ -15,6 +16,7 @@
 #include "cli/outputs.h"
 #include "cli/progress_bar.h"
 #include "cli/scene_culling.h"
+#include "cli/stage_clock.h"
 #include "core/culling/box_tree.h"
 #include "core/culling/cell_culling.h"
 #include "core/culling/certified_hiding.h"
@@ -39,33 +41,36 @@ class EverythingInView : public CullingMethod {
   }
   std::string_view name() const override { return "frustum"; }
   CullingAnswer visible(const Camera&) override { return all_; }
+  bool set_present(std::span<const std::uint8_t> is_present) override {
+    all_.visible_groups.clear();
+    for (GroupIndex g = 0; g < is_present.size(); ++g)
+      if (is_present[g]) all_.visible_groups.push_back(g);
+    return true;
+  }
 
  private:
   CullingAnswer all_;
 };
 
 constexpr char kPageName[] = "flight.html";
-/// Of the triangles, in the two levels that objects are counted with.
-constexpr double kCoarseShares[] = {0.25, 0.0625};
-
 constexpr float kSmallGapOpacity = 0.7F;
+
+/// Of the triangles in view that hom draws as occluders.
+constexpr double kEstimateShare = 0.25;
 
 /// What methods are made from; some of them share it.
 struct Prepared {
   GroupBatches batches;
   BoxTree tree;
+  std::optional<CoarseBatches> coarse;  ///< where a method that asks coarse levels flies
   double coarse_s = 0;
-  CoarseBatches coarse;
 
-  explicit Prepared(const LoadedScene& scene)
-      : batches(scene.tin, scene.groups), tree(batches), coarse(timed_coarse()) {}
-
- private:
-  CoarseBatches timed_coarse() {
-    const auto begun = std::chrono::steady_clock::now();
-    CoarseBatches made(batches, {std::begin(kCoarseShares), std::end(kCoarseShares)});
-    coarse_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-    return made;
+  Prepared(const LoadedScene& scene, bool with_coarse)
+      : batches(scene.tin, scene.groups), tree(batches) {
+    if (!with_coarse) return;
+    const Stopwatch watch;
+    coarse.emplace(batches, std::vector(std::begin(kQueryShares), std::end(kQueryShares)));
+    coarse_s = watch.seconds();
   }
 };
 
@@ -76,6 +81,10 @@ std::vector<CellSpace> cells_of_view(const LoadedScene& scene) {
   return walk_and_flight(scene.tin, std::sqrt(area_m2 / std::max(1U, scene.groups.leaf_count)) / 8);
 }
 
+bool is_wanted(const std::vector<std::string>& wanted, const std::string& method) {
+  return wanted.empty() || std::find(wanted.begin(), wanted.end(), method) != wanted.end();
+}
+
 /// Virtual occluders, where a method that asks for them flies.
 struct SectionsOfScene {
   std::vector<UprightOccluder> sections;
@@ -83,9 +92,9 @@ struct SectionsOfScene {
 
   SectionsOfScene(const Tin& tin, bool are_wanted) {
     if (!are_wanted) return;
-    const auto begun = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     sections = find_virtual_occluders(tin, {}).sections;
-    prepare_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+    prepare_s = watch.seconds();
   }
 
   std::uint64_t bytes() const {
@@ -101,8 +110,7 @@ std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& p
   std::vector<Contender> all;
   const auto add = [&](const std::string& label, bool is_conservative, double prepare_s,
                        std::uint64_t bytes, auto make) {
-    if (wanted.empty() || std::find(wanted.begin(), wanted.end(), label) != wanted.end())
-      all.push_back({label, is_conservative, prepare_s, bytes, make()});
+    if (is_wanted(wanted, label)) all.push_back({label, is_conservative, prepare_s, bytes, make()});
   };
   add("frustum", true, 0, 0,
       [&] { return std::make_unique<EverythingInView>(scene.groups.leaf_count); });
@@ -115,10 +123,8 @@ std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& p
   add("hzb", true, 0, 0, [&] { return std::make_unique<HzbCulling>(scene.tin, batches); });
   add("mask", false, 0, 0,
       [&] { return std::make_unique<MaskCulling>(scene.tin, batches, prepared.tree); });
-  const SectionsOfScene sections(
-      scene.tin, wanted.empty() || std::any_of(wanted.begin(), wanted.end(), [](const auto& name) {
-                   return name == "cells" || name == "law-tan";
-                 }));
+  const SectionsOfScene sections(scene.tin,
+                                 is_wanted(wanted, "cells") || is_wanted(wanted, "law-tan"));
   const auto by_occluders = [&] {
     return std::make_unique<OccluderHiding>(prepared.tree, batches, scene.tin, sections.sections);
   };
@@ -132,14 +138,26 @@ std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& p
     });
   add("law-tan", true, sections.prepare_s, sections.bytes(),
       [&] { return cells("law-tan", by_occluders()); });
+  MaskOptions plain;
+  plain.drawing = MaskDrawing::kByCentres;
+  add("mask-plain", false, 0, 0,
+      [&] { return std::make_unique<MaskCulling>(scene.tin, batches, prepared.tree, plain); });
   ImageCullingOptions hom;
-  add("hom", false, 0, 0, [&] { return std::make_unique<HomCulling>(batches, hom); });
+  const auto add_hom = [&](const char* label, DepthTest depth) {
+    add(label, false, 0, 0, [&] { return std::make_unique<HomCulling>(batches, depth, hom); });
+  };
+  hom.occluder_share = kEstimateShare;
+  add_hom("hom", DepthTest::kEstimate);
+  hom.occluder_share = 1;
+  add_hom("hybrid", DepthTest::kPyramid);
   hom.opacity = kSmallGapOpacity;
-  add("hom-0.7", false, 0, 0, [&] { return std::make_unique<HomCulling>(batches, hom); });
-  for (const QueryUse use : {QueryUse::kSameFrame, QueryUse::kNextFrame})
-    add(use == QueryUse::kSameFrame ? "lod-query" : "multi-frame", false, prepared.coarse_s,
-        prepared.coarse.bytes(),
-        [&] { return std::make_unique<QueryCulling>(batches, prepared.coarse, use); });
+  add_hom("hom-0.7", DepthTest::kPyramid);
+  add("volume-scan", false, 0, 0, [&] { return std::make_unique<VolumeScanCulling>(batches); });
+  if (prepared.coarse)
+    for (const QueryUse use : {QueryUse::kSameFrame, QueryUse::kNextFrame})
+      add(use == QueryUse::kSameFrame ? "lod-query" : "multi-frame", false, prepared.coarse_s,
+          prepared.coarse->bytes(),
+          [&] { return std::make_unique<QueryCulling>(batches, *prepared.coarse, use); });
   add("stop-and-wait", false, 0, 0, [&] { return std::make_unique<StopAndWaitCulling>(batches); });
   for (const std::string& name : wanted)
     if (std::none_of(all.begin(), all.end(), [&](const Contender& c) { return c.label == name; }))
@@ -150,7 +168,23 @@ std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& p
   return all;
 }
 
+/// Where the scene changes, methods that prepared for it cannot follow.
+void keep_those_that_follow(const LoadedScene& scene, std::vector<Contender>& contenders,
+                            const std::vector<std::string>& wanted) {
+  const std::vector<std::uint8_t> all(scene.groups.leaf_count, 1);
+  std::erase_if(contenders, [&](const Contender& contender) {
+    if (contender.method->set_present(all)) return false;
+    if (!wanted.empty())
+      throw Error(ErrorCode::kInput,
+                  fmt::format("--methods {}: was prepared for the scene as it is; leave it out, or "
+                              "--changes",
+                              contender.label));
+    return true;
+  });
+}
+
 Route route_of(const std::string& name) {
+  if (name == "street") return Route::kStreet;
   if (name == "walk") return Route::kWalk;
   if (name == "drive") return Route::kDrive;
   return name == "helicopter" ? Route::kHelicopter : Route::kAirliner;
@@ -175,27 +209,41 @@ nlohmann::json json_of(const Flight& flight, const std::vector<Contender>& conte
                        {"find_ms", sum.find_ms},
                        {"draw_ms", sum.draw_ms},
                        {"wrong_px", sum.wrong_px},
+                       {"judged_wrong_px", sum.judged_wrong_px},
                        {"missed_groups", sum.missed_groups},
+                       {"movers", sum.movers},
+                       {"missed_movers", sum.missed_movers},
                        {"bytes", contenders[c].bytes}});
   }
-  return {{"frames", flight.truth.size()}, {"methods", methods}};
+  std::uint64_t movers = 0, visible_movers = 0;
+  for (const FrameTruth& truth : flight.truth) {
+    movers += truth.movers;
+    visible_movers += truth.visible_movers;
+  }
+  return {{"frames", flight.truth.size()},
+          {"movers_in_view", movers},
+          {"movers_visible", visible_movers},
+          {"methods", methods}};
 }
 
 void print_table(const Flight& flight, const std::vector<Contender>& contenders) {
-  fmt::print("{:<10} {:>10} {:>9} {:>16} {:>9} {:>9} {:>13} {:>13}\n", "method", "drawn", "of view",
-             "of visible groups", "find, ms", "draw, ms", "wrong pixels", "groups missed");
+  fmt::print("{:<13} {:>9} {:>8} {:>17} {:>9} {:>9} {:>12} {:>7} {:>13}\n", "method", "drawn",
+             "of view", "of visible groups", "find, ms", "draw, ms", "wrong pixels", "judged",
+             "groups missed");
   for (std::size_t c = 0; c < contenders.size(); ++c) {
     const FlightSum sum = sum_of(flight, c);
-    std::uint64_t wrong_px = 0;
-    for (const std::uint64_t wrong : sum.wrong_px) wrong_px += wrong;
-    fmt::print("{:<10} {:>10.0f} {:>7.1f} % {:>16.2f}x {:>9.3f} {:>9.2f} {:>13} {:>13}\n",
+    const auto total = [](const auto& by_scale) {
+      return std::accumulate(by_scale.begin(), by_scale.end(), std::uint64_t{0});
+    };
+    fmt::print("{:<13} {:>9.0f} {:>6.1f} % {:>16.2f}x {:>9.3f} {:>9.2f} {:>12} {:>7} {:>13}\n",
                contenders[c].label, sum.drawn, 100 * sum.drawn / std::max(1.0, sum.in_view),
-               sum.drawn / std::max(1.0, sum.in_visible_groups), sum.find_ms, sum.draw_ms, wrong_px,
-               sum.missed_groups);
+               sum.drawn / std::max(1.0, sum.in_visible_groups), sum.find_ms, sum.draw_ms,
+               total(sum.wrong_px), total(sum.judged_wrong_px), sum.missed_groups);
   }
   fmt::print(
       "Drawn: triangles a frame, also as a share of those in view and as a multiple of those in "
-      "groups that are seen. Wrong pixels: of all frames and sizes.\n");
+      "groups that are seen. Wrong pixels: of all frames and sizes; judged: of those, what an "
+      "exact ray confirms.\n");
 }
 
 }  // namespace
@@ -207,23 +255,28 @@ int run_fly(const FlyOptions& options) {
       options.path_file.empty()
           ? find_path(scene, route_of(options.route), options.frames, options.seed)
           : read_path(options.path_file);
-  const Prepared prepared(scene);
+  const Prepared prepared(
+      scene, is_wanted(options.methods, "lod-query") || is_wanted(options.methods, "multi-frame"));
   std::vector<Contender> contenders = contenders_of(scene, prepared, options.methods);
+  if (options.changes > 0) keep_those_that_follow(scene, contenders, options.methods);
 
   Lens lens;
   lens.width_px = options.width_px;
   lens.height_px = std::max(1, options.width_px * 9 / 16);
   lens.vertical_field_of_view_deg = options.field_of_view_deg;
   const GeoFrame::Placer placer(scene.frame);
-  std::vector<Shot> shots;
-  for (const Waypoint& waypoint : path) shots.push_back(shot_at(placer, waypoint, lens));
+  FlightPlan plan;
+  for (const Waypoint& waypoint : path) plan.shots.push_back(shot_at(placer, waypoint, lens));
+  plan.movers = make_movers(scene, options.movers, options.route == "street", options.seed);
+  plan.changes = options.changes;
+  plan.seed = options.seed;
 
   std::vector<std::pair<std::string, std::string>> pictures;
   ProgressBar bar(!options.common.json);
   const Flight flight = fly(
-      prepared.batches, shots, contenders,
+      scene.index, prepared.batches, plan, contenders,
       [&](std::size_t frame, std::size_t contender, const Target& whole, const Target& drawn) {
-        if (!is_pictured(frame, shots.size(), options.pictures)) return;
+        if (!is_pictured(frame, path.size(), options.pictures)) return;
         const Picture picture = frame_picture(scene.tin, scene.groups, whole, drawn);
         const std::string name = fmt::format("frame-{}-{}.png", frame, contenders[contender].label);
         write_png(folder.path_for(name), picture.width_px, picture.height_px, picture.rgb,
@@ -243,7 +296,7 @@ int run_fly(const FlyOptions& options) {
                flight_page(flight, contenders,
                            fmt::format("{} over {}: {} frames of {} x {} pixels", way,
                                        std::filesystem::path(options.scene).filename().string(),
-                                       shots.size(), lens.width_px, lens.height_px),
+                                       path.size(), lens.width_px, lens.height_px),
                            pictures));
   folder.commit();
   if (options.common.json)

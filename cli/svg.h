@@ -8,7 +8,7 @@ namespace scarp {
 inline constexpr char kInkColour[] = "#2b2f36", kFaintColour[] = "#dfe3e8",
                       kSoftColour[] = "#69707a";
 
-/// Text as XML and HTML have it, in quotes too.
+/// Text as it is written in SVG and HTML, between tags or as an attribute.
 std::string escaped(const std::string& text);
 
 /// The head of a picture and its white ground; "</svg>\n" ends it.

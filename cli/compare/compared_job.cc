@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cassert>
 
-#include "cli/stopwatch.h"
+#include "cli/stage_clock.h"
 
 namespace scarp {
 
