@@ -13,6 +13,11 @@ namespace scarp::test {
 /// the shared data are not there.
 std::optional<Tin> mesh_of(const ListedDem& listed, std::uint32_t vertices);
 
+/// The same as `scarp build` meshes it unless told otherwise, to a tenth of a cell: of a raster of
+/// more than kMostBuiltSamples a side its middle.
+std::optional<Tin> built_mesh_of(const ListedDem& listed);
+inline constexpr std::int32_t kMostBuiltSamples = 1500;
+
 /// Whether a DEM is among names separated by commas; all are where there are none.
 bool is_asked_for(const ListedDem& listed, const std::string& names);
 

@@ -307,6 +307,7 @@ AdversarialReport search_arena(MakeArena make, std::uint64_t seed, std::size_t s
   HidingOptions options;
   options.fans = arena.least_fans << random.below(3);
   options.sectors = arena.least_sectors << random.below(3);
+  options.piece = 0.5;  // finer than usual: coarse bounds would hide what a margin is for
   const CertifiedRegions regions =
       certify_groups(arena.tin, arena.group_of_triangle, arena.groups, options);
   const AdversarialReport report =

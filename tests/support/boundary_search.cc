@@ -138,13 +138,14 @@ std::optional<double> greatest_hidden_z(const CertifiedRegions& regions, GroupIn
 BoundaryFinding search_boundaries(const TinIndex& index, const CertifiedRegions& regions,
                                   const std::vector<std::vector<TriangleIndex>>& members,
                                   const BoundarySearch& search) {
-  std::vector<BoundaryFinding> findings(members.size());
-  parallel_for(members.size(), [&](std::size_t g) {
+  std::vector<BoundaryFinding> findings(std::min(members.size(), search.most_groups));
+  parallel_for(findings.size(), [&](std::size_t i) {
+    const std::size_t g = i * members.size() / findings.size();
     const auto group = static_cast<GroupIndex>(g);
     // Groups must not climb the same random path.
     SplitMix64 seeds(search.seed);
     const std::uint64_t seed = seeds.next() ^ (g * 0x9E3779B97F4A7C15U);
-    findings[g] = Climber(index, regions, group, members[g], seed).run(search);
+    findings[i] = Climber(index, regions, group, members[g], seed).run(search);
   });
   BoundaryFinding all;
   all.least_slack_m = kNoSlack;

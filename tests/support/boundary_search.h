@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -26,8 +27,9 @@ std::optional<double> greatest_hidden_z(const CertifiedRegions& regions, GroupIn
 
 struct BoundarySearch {
   std::uint64_t seed = 1;
-  int starts = 4;  ///< random directions and distances around each group
-  int steps = 24;  ///< of each climb
+  int starts = 4;                      ///< random directions and distances around each group
+  int steps = 24;                      ///< of each climb
+  std::size_t most_groups = SIZE_MAX;  ///< of more groups, so many evenly spread over their order
 };
 
 /// What a search found, over all groups.
@@ -49,7 +51,7 @@ struct BoundaryFinding {
 ///
 /// @param members  triangles_of_groups of the same groups
 /// Parallel over the groups; the same finding for any number of threads.
-/// Cost: groups * starts * steps * about two judgements of a group.
+/// Cost: searched groups * starts * steps * about two judgements of a group.
 BoundaryFinding search_boundaries(const TinIndex& index, const CertifiedRegions& regions,
                                   const std::vector<std::vector<TriangleIndex>>& members,
                                   const BoundarySearch& search);

@@ -66,13 +66,9 @@ class Bounding {
     origin_x_m_ = round_to_lattice(bounds.low.x_m + width_m / 2);
     origin_y_m_ = round_to_lattice(bounds.low.y_m + depth_m / 2);
     const std::size_t own = own_triangles.value_or(tin.triangles.size());
-    double area_m2 = 0, radius_m = 0;
-    for (const auto& [a, b, c] : std::span(tin.triangles).first(own)) {
-      const Position &p = tin.vertices[a], &q = tin.vertices[b], &r = tin.vertices[c];
-      area_m2 += ((q.x_m - p.x_m) * (r.y_m - p.y_m) - (q.y_m - p.y_m) * (r.x_m - p.x_m)) / 2;
-    }
+    double radius_m = 0;
+    measure_groups(group_of_triangle);
     for (const Circle& circle : bounds_.circle) radius_m += circle.radius_m / groups;
-    unit_m_ = std::sqrt(2 * area_m2 / static_cast<double>(own));
     // The finer rings where they reach over the whole surface; the same for all tiles of a scene.
     const double reach = std::hypot(width_m, depth_m) / radius_m;
     const bool is_all = own == tin.triangles.size();
@@ -98,7 +94,8 @@ class Bounding {
         view_along(fan_of(options_.fans, order[static_cast<std::size_t>(begin) + i]), tin_,
                    origin_x_m_, origin_y_m_, views[i]);
         turns[i].turn_to(bounds_.layout, views[i].fan, rings);
-        ridges[i].cross(ridge_edges_, views[i], options_.width * unit_m_, looked_from(views[i]));
+        ridges[i].cross(ridge_edges_, views[i], options_.width * mean_unit_m_,
+                        looked_from(views[i]));
       });
       parallel_for(bounds_.circle.size(), [&](std::size_t group) {
         for (std::size_t i = 0; i < count; ++i)
@@ -122,6 +119,23 @@ class Bounding {
         }
       bounds_.height_m.push_back(top_m);
       bounds_.circle.push_back(enclosing_circle(convex_hull(std::move(corners))));
+    }
+  }
+
+  /// Distances between vertices: near voids a mesh is far finer than elsewhere.
+  void measure_groups(std::span<const GroupIndex> group_of_triangle) {
+    std::vector<double> area_m2(bounds_.circle.size(), 0), triangles(bounds_.circle.size(), 0);
+    for (TriangleIndex t = 0; t < tin_.triangles.size(); ++t) {
+      const GroupIndex group = group_of_triangle[t];
+      if (group == kNone) continue;
+      const auto& [a, b, c] = tin_.triangles[t];
+      const Position &p = tin_.vertices[a], &q = tin_.vertices[b], &r = tin_.vertices[c];
+      area_m2[group] += ((q.x_m - p.x_m) * (r.y_m - p.y_m) - (q.y_m - p.y_m) * (r.x_m - p.x_m)) / 2;
+      ++triangles[group];
+    }
+    for (std::size_t g = 0; g < area_m2.size(); ++g) {
+      unit_m_.push_back(std::sqrt(2 * area_m2[g] / triangles[g]));
+      mean_unit_m_ += unit_m_[g] / static_cast<double>(area_m2.size());
     }
   }
 
@@ -185,6 +199,7 @@ class Bounding {
     double slope;
     float rise;  // of its line over the group's height at the centre, in radii
     std::ptrdiff_t crossing;
+    bool is_tried = false, is_walled = false;
   };
 
   /// Works out one group for the rays of one fan.
@@ -194,7 +209,7 @@ class Bounding {
     const RingTable& rings;
     const Turns& turns;
     FanPlace centre;
-    double radius_m, height_m;
+    double radius_m, height_m, unit_m;
     float* bounds;  // of the group: [kRings * sectors]
     ReachedCells::Known known;
     std::vector<FanEdge> crests{};
@@ -229,6 +244,7 @@ class Bounding {
               {},
               circle.radius_m,
               bounds_.height_m[group],
+              unit_m_[group],
               bounds,
               {bounds, least_.data() + first_cell}};
     look.centre =
@@ -374,16 +390,15 @@ class Bounding {
     std::size_t open_end = reached.end_of_open();
     /// @return whether the last ridge carries a wall, if one is wanted
     const auto raise_before = [&](std::size_t end) {
-      int raised = 0;
       const std::size_t tries = std::min<std::size_t>(kMostTries, look.sighted.size());
-      for (std::size_t i = 1; i <= tries && raised < 2; ++i) {
-        const Sighted& sighted = look.sighted[look.sighted.size() - i];
+      for (std::size_t i = 1; i <= tries; ++i) {
+        Sighted& sighted = look.sighted[look.sighted.size() - i];
         if (!reached.is_promising(sighted.rise, static_cast<float>(sighted.slope), ring, end))
-          break;
-        if (raise(sighted))
-          ++raised;
-        else if (i == 1 && look.failures < kMostFailures)
-          return false;
+          return true;
+        // Its wall counts for all rings beyond it: once is enough.
+        const bool was_tried = std::exchange(sighted.is_tried, true);
+        if (was_tried ? sighted.is_walled : (sighted.is_walled = raise(sighted))) return true;
+        if (i == 1 && look.failures < kMostFailures) return false;
       }
       return true;
     };
@@ -436,7 +451,7 @@ class Bounding {
     raise_walls(look, piece, targets, lane);
     if (!look.reached().is_open(0, kRings)) return look.reached().lower(look.bounds);
     const double du_m = piece.b.u_m - piece.a.u_m, dv_m = piece.b.v_m - piece.a.v_m;
-    const double size_m = options_.piece * unit_m_;
+    const double size_m = options_.piece * look.unit_m;
     if (look.depth < kMostHalvings && du_m * du_m + dv_m * dv_m > size_m * size_m) {
       const FanPlace middle{piece.a.u_m + du_m / 2, piece.a.v_m + dv_m / 2,
                             piece.a.z_m + (piece.b.z_m - piece.a.z_m) / 2};
@@ -459,7 +474,8 @@ class Bounding {
   HidingBounds bounds_;
   std::vector<std::uint16_t> least_;  // slope hints: [groups * kRings * sectors]
   double origin_x_m_ = 0, origin_y_m_ = 0;
-  double unit_m_ = 0;
+  std::vector<double> unit_m_;  // mean distance between vertices: [groups]
+  double mean_unit_m_ = 0;
 };
 
 }  // namespace

@@ -16,11 +16,12 @@ namespace scarp {
 
 /// How finely hiding is bounded. Every setting is safe; finer ones find more.
 struct HidingOptions {
-  std::int32_t fans = 128;     ///< of directions; a multiple of 8
+  std::int32_t fans = 192;     ///< of directions; a multiple of 8
   std::int32_t sectors = 248;  ///< of camera azimuths around a group
-  double piece = 0.5;   ///< greatest length of what is looked at by itself of a group's border, in
-                        ///< mean distances between vertices
-  double width = 0.25;  ///< of strips in which ridges are looked for, in the same unit
+  double piece = 1;  ///< greatest length of what is looked at by itself of a group's border, in
+                     ///< mean distances between the group's vertices
+  double width =
+      0.25;  ///< of strips in which ridges are looked for, in the mean unit of all groups
 };
 
 /// For each group, sector of azimuths and ring of distances that a camera can have from the

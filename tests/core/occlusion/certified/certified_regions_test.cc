@@ -236,6 +236,35 @@ TEST(CertifiedRegions, AWallHidesWhatIsBehindIt) {
     EXPECT_FALSE(hides_group(scene.regions, g, {50, 300, 5000}));
 }
 
+TEST(CertifiedRegions, CamerasFarOutsideTheDataAreBoundedRingByRing) {
+  // Beyond two radii of a group outside the data no cell is worked on by itself: all that holds
+  // there are bounds of whole rings.
+  const Certified scene =
+      certify(test::triangulated(test::random_hills(24, 24, 10, 5, 150, 0.01)), 32, few_fans());
+  const TinIndex index(scene.tin);
+  const Bounds bounds = bounds_of(scene.tin.vertices);
+  const double middle_x_m = (bounds.low.x_m + bounds.high.x_m) / 2;
+  const double middle_y_m = (bounds.low.y_m + bounds.high.y_m) / 2;
+  std::mt19937_64 random(9);
+  std::size_t seen_at_all = 0;
+  for (int i = 0; i < 120; ++i) {
+    const double azimuth_rad = static_cast<double>(random() % 6283) / 1000;
+    const double distance_m = 500 + static_cast<double>(random() % 1000);
+    const Position eye =
+        round_to_lattice(Position{middle_x_m + distance_m * std::cos(azimuth_rad),
+                                  middle_y_m + distance_m * std::sin(azimuth_rad),
+                                  bounds.low.z_m + static_cast<double>(random() % 400)});
+    const std::vector<std::uint8_t> seen = seen_groups(scene, index, eye);
+    for (GroupIndex g = 0; g < scene.groups.count; ++g) {
+      seen_at_all += seen[g];
+      if (seen[g]) {
+        EXPECT_FALSE(hides_group(scene.regions, g, eye)) << "group " << g << ", eye " << i;
+      }
+    }
+  }
+  EXPECT_GT(seen_at_all, 1000U);
+}
+
 TEST(CertifiedRegions, ACameraUnderAllGroundOutsideTheDataSeesSlopesThatFallTowardsIt) {
   // A rough roof: outside, between the lowest ground and the planes of its slopes, one looks up at
   // it.
