@@ -410,7 +410,7 @@ int run_compare(const CompareOptions& options) {
     if (!(std::abs(height_m) <= 1e7))
       throw Error(ErrorCode::kUsage,
                   fmt::format("--heights {}: metres above ground were expected", height_m));
-  const LoadedScene scene(options.scene);
+  const LoadedScene scene(options.scene, {options.common.memory_budget_bytes});
   OutputFolder output(options.output, existing(options.common));
   Comparison comparison(options, scene);
   comparison.run();
