@@ -32,7 +32,62 @@ bool is_beside(const TileContents& contents, const Position& eye, const ViewRang
          is_right_of(contents, eye, (view.from_rad + view.to_rad) / 2 - M_PI / 2);
 }
 
+/// The triangles of a surface that may come nearer to a place than a distance, in their order.
+Tin part_near(const Tin& tin, const Position& place, double distance_m) {
+  Tin part;
+  std::vector<VertexIndex> new_vertex(tin.vertices.size(), kNone);
+  for (auto triangle : tin.triangles) {
+    const Position corners[] = {tin.vertices[triangle[0]], tin.vertices[triangle[1]],
+                                tin.vertices[triangle[2]]};
+    const Bounds bounds = bounds_of(corners);
+    if (bounds.low.x_m > place.x_m + distance_m || bounds.high.x_m < place.x_m - distance_m ||
+        bounds.low.y_m > place.y_m + distance_m || bounds.high.y_m < place.y_m - distance_m)
+      continue;
+    for (VertexIndex& v : triangle) {
+      if (new_vertex[v] == kNone) {
+        new_vertex[v] = static_cast<VertexIndex>(part.vertices.size());
+        part.vertices.push_back(tin.vertices[v]);
+      }
+      v = new_vertex[v];
+    }
+    part.triangles.push_back(triangle);
+  }
+  connect_neighbours(part);
+  return part;
+}
+
 }  // namespace
+
+bool may_meet(const TileContents& contents, const ViewPlan& plan) {
+  const double dx =
+      std::max({contents.low[0] - plan.eye.x_m, plan.eye.x_m - contents.high[0], 0.0});
+  const double dy =
+      std::max({contents.low[1] - plan.eye.y_m, plan.eye.y_m - contents.high[1], 0.0});
+  if (std::hypot(dx, dy) > plan.radius_m + kBesideM) return false;
+  return !plan.view || !is_beside(contents, plan.eye, *plan.view);
+}
+
+ViewPlan view_towards(const Position& eye, const TileContents& contents) {
+  ViewPlan plan{eye, 0, {}};
+  const double middle_x_m = (contents.low[0] + contents.high[0]) / 2;
+  const double middle_y_m = (contents.low[1] + contents.high[1]) / 2;
+  const double middle_rad = std::atan2(middle_y_m - eye.y_m, middle_x_m - eye.x_m);
+  double right_rad = 0, left_rad = 0;  // of the middle
+  for (const double x : {contents.low[0] - kBesideM, contents.high[0] + kBesideM}) {
+    for (const double y : {contents.low[1] - kBesideM, contents.high[1] + kBesideM}) {
+      plan.radius_m = std::max(plan.radius_m, std::hypot(x - eye.x_m, y - eye.y_m));
+      const double turn_rad =
+          std::remainder(std::atan2(y - eye.y_m, x - eye.x_m) - middle_rad, 2 * M_PI);
+      right_rad = std::min(right_rad, turn_rad);
+      left_rad = std::max(left_rad, turn_rad);
+    }
+  }
+  const bool is_inside =
+      eye.x_m >= contents.low[0] - 2 * kBesideM && eye.x_m <= contents.high[0] + 2 * kBesideM &&
+      eye.y_m >= contents.low[1] - 2 * kBesideM && eye.y_m <= contents.high[1] + 2 * kBesideM;
+  if (!is_inside) plan.view = ViewRange{middle_rad + right_rad, middle_rad + left_rad};
+  return plan;
+}
 
 SceneTiles::SceneTiles(const std::string& path)
     : scene_(open_scene(path)), frame_(frame_of(scene_.description())) {
@@ -47,14 +102,7 @@ SceneTiles::SceneTiles(const std::string& path)
 }
 
 bool SceneTiles::meets(std::size_t i, const ViewPlan& plan) const {
-  if (!tile(i).contents) return true;
-  const TileContents& contents = *tile(i).contents;
-  const double dx =
-      std::max({contents.low[0] - plan.eye.x_m, plan.eye.x_m - contents.high[0], 0.0});
-  const double dy =
-      std::max({contents.low[1] - plan.eye.y_m, plan.eye.y_m - contents.high[1], 0.0});
-  if (std::hypot(dx, dy) > plan.radius_m + kBesideM) return false;
-  return !plan.view || !is_beside(contents, plan.eye, *plan.view);
+  return !tile(i).contents || may_meet(*tile(i).contents, plan);
 }
 
 Tin SceneTiles::read_tin(std::size_t i) {
@@ -109,7 +157,8 @@ MapPoint SceneTiles::resolve(const TypedPosition& typed, const std::string& crs)
   point.height_m = 0;
   // The place in the plane depends a little on the height: see ground_height_m.
   constexpr double kLeanM = 100;
-  const Tin ground = read_ground(tiles_in({placer.place(point), kLeanM, {}}));
+  const Position place = placer.place(point);
+  const Tin ground = part_near(read_ground(tiles_in({place, kLeanM, {}})), place, kLeanM);
   return scarp::resolve(typed, crs, frame_, TinIndex(ground));
 }
 
