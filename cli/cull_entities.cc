@@ -49,7 +49,7 @@ std::string quoted(const std::string& text) {
 }  // namespace
 
 int run_cull_entities(const CullOptions& options) {
-  const LoadedScene scene(options.scene);
+  const LoadedScene scene(options.scene, {options.common.memory_budget_bytes});
   const auto entities =
       read_observers(options.entities_file, scene.scene.description().crs_wkt, options.crs);
   const MapPoint at = resolve(options.camera, options.crs, scene.frame, scene.index);
