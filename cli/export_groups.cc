@@ -11,8 +11,10 @@ namespace scarp {
 void export_groups(const ExportOptions& options, SceneTiles&, const PartFolder& folder,
                    Stages& stages, nlohmann::json& result) {
   std::unique_ptr<LoadedScene> scene;
-  stages.run("read",
-             [&](const Progress&) { scene = std::make_unique<LoadedScene>(options.scene); });
+  stages.run("read", [&](const Progress&) {
+    scene =
+        std::make_unique<LoadedScene>(options.scene, ScenePart{options.common.memory_budget_bytes});
+  });
   const CullingSource source = culling_source(*scene);
   std::vector<std::byte> bytes;
   stages.run("groups.scarp", [&](const Progress&) {

@@ -59,9 +59,12 @@ std::vector<double> triangle_errors_m(const ExportOptions& options, SceneTiles& 
   const TileWindow window = scene.window_of({tile});
   const SampleGrid grid = samples_of_tile(source, window);
   Mesh mesh;
-  mesh.tin = scene.read_tin(tile);
-  mesh.sample_of_vertex =
-      read_sample_of_vertex(scene.scene().open(scene.scene().require(scene.tile(tile).id, "tin")));
+  SampledTin sampled =
+      read_sampled_tin(scene.scene().open(scene.scene().require(scene.tile(tile).id, "tin")));
+  mesh.tin = std::move(sampled.tin);
+  mesh.sample_of_vertex = std::move(sampled.sample_of_vertex);
+  if (mesh.sample_of_vertex.size() != mesh.tin.vertices.size())
+    refuse("has no samples where the scene has vertices");
   for (std::size_t v = 0; v < mesh.tin.vertices.size(); ++v) {
     std::int64_t& sample = mesh.sample_of_vertex[v];
     if (sample < 0) refuse("has no samples where the scene has buildings");

@@ -287,8 +287,10 @@ void export_airspace(const ExportOptions& options, const LoadedScene& scene,
 void export_vdb(const ExportOptions& options, SceneTiles&, const PartFolder& folder, Stages& stages,
                 nlohmann::json& result) {
   std::unique_ptr<LoadedScene> scene;
-  stages.run("read",
-             [&](const Progress&) { scene = std::make_unique<LoadedScene>(options.scene); });
+  stages.run("read", [&](const Progress&) {
+    scene =
+        std::make_unique<LoadedScene>(options.scene, ScenePart{options.common.memory_budget_bytes});
+  });
   if (options.observer)
     export_airspace(options, *scene, folder, stages, result);
   else

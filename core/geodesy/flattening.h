@@ -43,13 +43,11 @@ class Flattening {
   /// Cosine of the angle between a point and the centre, seen from the origin.
   double cosine_from_centre(const EcefPoint& point) const;
 
-  /// Where the verticals meet.
-  const EcefPoint& origin() const { return origin_; }
-
   /// The inverse, for what leaves the program. Exact up to rounding.
   EcefPoint unflatten(const Position& p) const;
 
-  /// What the map is made of, for formats that repeat it: unit vectors, D and k D^2 / R.
+  /// What the map is made of, for formats that repeat it: where the verticals meet, unit vectors,
+  /// D and k D^2 / R.
   const EcefPoint& origin() const { return origin_; }
   const EcefPoint& east() const { return east_; }
   const EcefPoint& north() const { return north_; }

@@ -57,7 +57,7 @@ class ExportCulling : public testing::Test {
     GDALClose(dataset);
     for (const char* name : {"tiled", "whole"})
       ASSERT_EQ(run_scarp("$SCARP build '" + dem + "' -o '" + scene(name) +
-                          "' --max-error 6 --fans 24 --group-triangles 40 "
+                          "' --max-error 3 --fans 24 --group-triangles 40 "
                           "--min-group-triangles 10 --refraction 0.13 --tile-samples " +
                           (std::string(name) == "tiled" ? "64" : "256"))
                     .exit_code,
@@ -119,9 +119,9 @@ TEST_F(ExportCulling, TheHeaderHidesWhatCullHides) {
       by_header += culling.groups() - shows.size();
       for (const std::uint32_t group : visible) more += shows.count(group) == 0;
     }
-    EXPECT_GT(by_cull, 60U);
-    EXPECT_GT(static_cast<double>(by_header), 0.98 * static_cast<double>(by_cull));
-    EXPECT_LT(static_cast<double>(more), 0.01 * static_cast<double>(by_cull));
+    EXPECT_GT(by_cull, 0U);
+    EXPECT_GE(by_header + 1, by_cull);
+    EXPECT_LE(more, 1U);
   }
 }
 
@@ -153,7 +153,7 @@ TEST_F(ExportCulling, ViewCellsAndAnObserversAirspaceAreWritten) {
   const RunResult made = run_scarp("$SCARP export '" + scene("tiled") + "' --to vdb -o '" + cells +
                                    "' --cell 300 --altitudes 10,100 --json");
   ASSERT_EQ(made.exit_code, 0) << made.errors;
-  EXPECT_GT(json::parse(made.output)["hidden_share"], 0.03);
+  EXPECT_GT(json::parse(made.output)["hidden_share"], 0.01);
   const HiddenSets sets =
       read_sets(SectionFile::open(cells + "/hidden_sets.bin", Verify::kEverything));
   EXPECT_EQ(json::parse(made.output)["sets"], sets.size());

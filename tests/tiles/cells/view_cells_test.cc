@@ -124,7 +124,7 @@ TEST(ViewCells, ShareSetsThatHoldNearlyAll) {
     kept += fewer.size(), all += more.size();
   }
   EXPECT_GT(static_cast<double>(kept), 0.8 * static_cast<double>(all));
-  EXPECT_LT(shared.sets.size(), filled().sets.size() * 3 / 4);
+  EXPECT_LT(shared.sets.size(), filled().sets.size() * 9 / 10);
 }
 
 TEST(SetsFile, ReadsBackWhatWasWritten) {

@@ -348,6 +348,24 @@ TEST(Runtime, HidesNoBoxThatAnyCameraOfACellSees) {
   }
 }
 
+/// Behind a plateau 100 m high that begins 290 m from the camera, a mast 990 m away is seen from
+/// 220.7 m on: answers turn over just below.
+TEST(Runtime, AMastBehindAPlateauIsSeenFromItsHeightOn) {
+  std::vector<double> profile_m(120, 0);
+  std::fill(profile_m.begin() + 30, profile_m.begin() + 61, 100);
+  const auto scene = test::culling_scene(
+      test::triangulated(test::extruded_profile(profile_m, 10, 24)), 40, 16, 16);
+  Culling culling;
+  ASSERT_EQ(culling.open(scene->file.data(), scene->file.size()), Status::kOk);
+  const auto camera = culling.camera_in_frame(10, 120, 50);
+  const auto is_visible = [&](double top_m) {
+    return culling.box_visible(camera, culling.box_in_frame(1000, 119, 1002, 121, top_m));
+  };
+  EXPECT_FALSE(is_visible(10));
+  EXPECT_FALSE(is_visible(205));
+  EXPECT_TRUE(is_visible(221));
+}
+
 TEST(Runtime, TilesAreAnsweredAsTheJudgeSeesThem) {
   // A wall before a low plain, which is the tile.
   const Tin tin = test::triangulated(
