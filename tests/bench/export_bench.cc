@@ -85,9 +85,10 @@ void print_export(const std::string& scene, const std::string& folder, const std
   const std::string out = folder + "/" + name;
   fs::remove_all(out);
   const Ran ran = run("export '" + scene + "' -o '" + out + "' " + options, folder + "/out.json");
+  const json result = json::parse(std::ifstream(folder + "/out.json"));
   std::uint64_t most = 0;
-  for (const json& stage : json::parse(std::ifstream(folder + "/out.json"))["stages"])
-    most = std::max(most, stage["peak_memory_bytes"].get<std::uint64_t>());
+  for (const json& stage : result["stages"])
+    most = std::max(most, stage["peak_bytes"].get<std::uint64_t>());
   const std::uint64_t bytes = bytes_below(out);
   fmt::print("| `{}` | {:.1f} | {:.1f} | {} | {:.1f} | {:.1f} |\n", options, ran.wall_s, ran.cpu_s,
              most >> 20, static_cast<double>(bytes) / 1e6,
@@ -118,7 +119,9 @@ int main(int argc, char** argv) {
                             folder + "/out.json");
       fmt::print("built in {:.0f} s\n", built.wall_s);
     }
-    fmt::print("\n{} tile(s), {} triangles of the finest level\n\n", tiles, triangles_of(scene));
+    fmt::print("\n{}: {} triangles of the finest level\n\n",
+               std::string(tiles) == "one" ? "One tile" : "Tiles of 256 cells",
+               triangles_of(scene));
     fmt::print("| export | seconds | CPU seconds | MiB | MB written | bytes a triangle |\n");
     fmt::print("|---|---:|---:|---:|---:|---:|\n");
     for (const char* options :
