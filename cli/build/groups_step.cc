@@ -82,8 +82,7 @@ class SeenGround {
   SeenGround(StepRun& run, Tin own) {
     const TileScheme& scheme = run.plan().scheme;
     ids_.push_back(run.tile());
-    tins_.push_back(std::move(own));
-    samples_.emplace_back();
+    meshes_.push_back({std::move(own), {}});
     for (const TileId& id : scheme.seen_from(run.tile())) {
       if (id == run.tile()) continue;
       const bool is_fine = id.level == scheme.finest_level();
@@ -91,23 +90,22 @@ class SeenGround {
           run.open(is_fine ? tile_file_name(name_of(id), "tin") : occluder_file_name(id));
       if (!file) continue;
       ids_.push_back(id);
-      tins_.push_back(read_tin(*file));
-      samples_.push_back(is_fine ? std::vector<std::int64_t>() : read_sample_of_vertex(*file));
+      meshes_.push_back(read_sampled_tin(*file));
     }
   }
 
-  const Tin& own() const { return tins_.front(); }
+  const Tin& own() const { return meshes_.front().tin; }
 
   TileView view(const TileScheme& scheme) const {
     std::vector<SeenTile> seen;
-    for (std::size_t i = 0; i < ids_.size(); ++i) seen.push_back({ids_[i], &tins_[i], samples_[i]});
+    for (std::size_t i = 0; i < ids_.size(); ++i)
+      seen.push_back({ids_[i], &meshes_[i].tin, meshes_[i].sample_of_vertex});
     return view_of_tile(scheme, seen);
   }
 
  private:
   std::vector<TileId> ids_;
-  std::vector<Tin> tins_;
-  std::vector<std::vector<std::int64_t>> samples_;
+  std::vector<SampledTin> meshes_;
 };
 
 void certify(StepRun& run, Tin own, Groups& groups) {

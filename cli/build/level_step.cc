@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "cli/build/step_run.h"
+#include "cli/loaded_scene.h"
 #include "core/terrain/occluder.h"
 #include "core/terrain/range_pyramid.h"
 #include "ingest/mesh/tile_mesh.h"
@@ -59,22 +60,20 @@ class FinerGround {
           run.open(occluders ? occluder_file_name(id) : tile_file_name(name_of(id), "tin"));
       if (!file) continue;
       ids_.push_back(id);
-      tins_.push_back(read_tin(*file));
-      samples_.push_back(read_sample_of_vertex(*file));
+      meshes_.push_back(read_sampled_tin(*file));
     }
   }
 
   std::vector<SeenTile> tiles() const {
     std::vector<SeenTile> tiles;
     for (std::size_t i = 0; i < ids_.size(); ++i)
-      tiles.push_back({ids_[i], &tins_[i], samples_[i]});
+      tiles.push_back({ids_[i], &meshes_[i].tin, meshes_[i].sample_of_vertex});
     return tiles;
   }
 
  private:
   std::vector<TileId> ids_;
-  std::vector<Tin> tins_;
-  std::vector<std::vector<std::int64_t>> samples_;
+  std::vector<SampledTin> meshes_;
 };
 
 /// How far this level lies from the finest: from the next one, and what that one has gathered.
@@ -106,7 +105,9 @@ void level_of_tile(StepRun& run) {
     if (mesh.tin.triangles.empty()) return;
     run.facts = facts_of_mesh(mesh);
     run.make(tile_file_name(name_of(tile), "tin"), "tin", [&](const std::string& path) {
-      write_compact_tin(path, mesh.tin, mesh.sample_of_vertex, Existing::kReplace);
+      write_compact_tin(path, mesh.tin, mesh.sample_of_vertex, plan.scheme.columns(),
+                        vertex_heights_m(mesh.tin, *run.open_source().dem().frame),
+                        Existing::kReplace);
     });
     const SeenTile coarse{tile, &mesh.tin, mesh.sample_of_vertex};
     FinerGround finer(run, false);

@@ -148,7 +148,8 @@ void mesh_of_tile(StepRun& run) {
       if (plan.has_one_tile())
         write_tin(path, mesh.tin, mesh.sample_of_vertex, Existing::kReplace);
       else
-        write_compact_tin(path, mesh.tin, mesh.sample_of_vertex, Existing::kReplace);
+        write_compact_tin(path, mesh.tin, mesh.sample_of_vertex, plan.scheme.columns(),
+                          vertex_heights_m(mesh.tin, *source.dem().frame), Existing::kReplace);
     });
   });
   run.check_sources();

@@ -4,13 +4,14 @@
 
 #include <cassert>
 #include <cmath>
+#include <tuple>
 
 #include "tiles/store/layout_section.h"
 
 namespace scarp {
 namespace {
 
-constexpr std::uint32_t kGroupsVersion = 1;
+constexpr std::uint32_t kGroupsVersion = 2;
 
 static_assert(sizeof(RegionPoint) == 2 * sizeof(double));
 
@@ -32,6 +33,58 @@ struct CertifiedScale {
   float radius_m, low_slope, slope_step;
 };
 
+constexpr std::size_t kStepsOfSector = std::tuple_size_v<SectorSteps>;
+constexpr std::size_t kPlanesOfStep = 3;
+
+std::uint8_t sign_lowest(int value) {
+  return static_cast<std::uint8_t>(value << 1 ^ value >> 31);
+}
+
+/// Steps as differences from the sector before, in bytes of one meaning after the other, so that
+/// they can be packed: of each step the rings of all groups and sectors, then the low bytes of
+/// their codes, then the high ones.
+std::vector<std::uint8_t> planes_of(const CertifiedRegions& regions) {
+  const std::size_t count = regions.steps.size();
+  std::vector<std::uint8_t> planes(kStepsOfSector * kPlanesOfStep * count);
+  std::uint8_t* ring = planes.data();
+  for (std::size_t k = 0; k < kStepsOfSector; ++k, ring += kPlanesOfStep * count) {
+    std::uint32_t before = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::uint32_t step = regions.steps[i][k];
+      ring[i] = sign_lowest(static_cast<int>(step >> kSlopeBits) -
+                            static_cast<int>(before >> kSlopeBits));
+      const int difference =
+          static_cast<int>(step % kSlopeCodes) - static_cast<int>(before % kSlopeCodes);
+      const auto code = static_cast<std::uint32_t>(difference << 1 ^ difference >> 31);
+      ring[count + i] = static_cast<std::uint8_t>(code);
+      ring[2 * count + i] = static_cast<std::uint8_t>(code >> 8);
+      before = step;
+    }
+  }
+  return planes;
+}
+
+std::vector<SectorSteps> steps_of(const std::vector<std::uint8_t>& planes,
+                                  const SectionFile& file) {
+  const std::size_t count = planes.size() / (kStepsOfSector * kPlanesOfStep);
+  if (planes.size() % (kStepsOfSector * kPlanesOfStep) != 0)
+    file.fail("steps of certified regions that do not come in fours");
+  std::vector<SectorSteps> steps(count);
+  const std::uint8_t* ring = planes.data();
+  const auto difference = [](std::uint32_t code) { return (code >> 1) ^ (0 - (code & 1)); };
+  for (std::size_t k = 0; k < kStepsOfSector; ++k, ring += kPlanesOfStep * count) {
+    std::uint32_t ring_before = 0, code_before = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      ring_before += difference(ring[i]);
+      code_before += difference(ring[count + i] | std::uint32_t{ring[2 * count + i]} << 8);
+      // What no writer makes comes out as some other step.
+      steps[i][k] = static_cast<std::uint16_t>((ring_before << kSlopeBits) |
+                                               (code_before & (kSlopeCodes - 1)));
+    }
+  }
+  return steps;
+}
+
 void add_certified(SectionFileWriter& writer, const CertifiedRegions& regions) {
   std::vector<CertifiedPlace> places;
   std::vector<CertifiedScale> scales;
@@ -41,9 +94,9 @@ void add_certified(SectionFileWriter& writer, const CertifiedRegions& regions) {
   }
   const std::vector<std::int32_t> layout = {regions.layout.sectors, regions.layout.ring_bits};
   writer.add_owned<std::int32_t>("cert_layout", layout);
-  writer.add_owned<double>("cert_place", places);
-  writer.add_owned<float>("cert_scale", scales);
-  writer.add<std::uint8_t>("cert_steps", std::span(regions.steps));
+  writer.add_packed<double>("cert_place", places);
+  writer.add_packed<float>("cert_scale", scales);
+  writer.add_packed<std::uint8_t>("cert_steps", planes_of(regions));
 }
 
 void read_certified(Groups& groups, const SectionFile& file) {
@@ -52,15 +105,15 @@ void read_certified(Groups& groups, const SectionFile& file) {
   if (layout.size() != 2)
     file.fail(fmt::format("{} numbers of a layout where 2 were expected", layout.size()));
   regions.layout = {layout[0], layout[1]};
-  const auto places = file.copy<double, CertifiedPlace>("cert_place");
-  const auto scales = file.copy<float, CertifiedScale>("cert_scale");
+  const auto places = file.unpack<double, CertifiedPlace>("cert_place");
+  const auto scales = file.unpack<float, CertifiedScale>("cert_scale");
   if (places.size() != groups.leaf_count || scales.size() != places.size())
     file.fail(fmt::format("{} places and {} scales of certified regions for {} groups",
                           places.size(), scales.size(), groups.leaf_count));
   for (std::size_t g = 0; g < places.size(); ++g)
     regions.groups.push_back({places[g].centre_x_m, places[g].centre_y_m, places[g].height_m,
                               scales[g].radius_m, scales[g].low_slope, scales[g].slope_step});
-  regions.steps = file.copy<std::uint8_t, SectorSteps>("cert_steps");
+  regions.steps = steps_of(file.unpack<std::uint8_t, std::uint8_t>("cert_steps"), file);
   if (const auto broken = check_certified(regions))
     file.fail(fmt::format("of the certified regions, {}", *broken));
   // Cameras are looked up in float: a centre from which a square of a distance overflows has none.
@@ -75,8 +128,8 @@ std::size_t region_count(const Groups& groups) {
 }
 
 void read_nodes(Groups& groups, const SectionFile& file) {
-  const auto links = file.copy<std::uint32_t, NodeLinks>("node_links");
-  const auto circles = file.copy<double, NodeCircle>("node_circle");
+  const auto links = file.unpack<std::uint32_t, NodeLinks>("node_links");
+  const auto circles = file.unpack<double, NodeCircle>("node_circle");
   if (links.size() != circles.size() || links.size() >= kNone)
     file.fail(fmt::format("{} nodes with {} circles", links.size(), circles.size()));
   for (std::size_t n = 0; n < links.size(); ++n) {
@@ -158,12 +211,12 @@ SectionFileWriter groups_writer(const Groups& groups) {
   SectionFileWriter writer(kGroupsKind, kGroupsVersion);
   add_layout(writer, regions.layout);
   writer.add<std::uint32_t>("leaf_count", std::span(&groups.leaf_count, 1));
-  writer.add<std::uint32_t>("group_of_tri", std::span(groups.group_of_triangle));
-  writer.add_owned<std::uint32_t>("node_links", links);
-  writer.add_owned<double>("node_circle", circles);
-  writer.add<std::uint32_t>("region_first", std::span(regions.first));
-  writer.add<double>("region_point", std::span(regions.points));
-  writer.add<double>("end_slope", std::span(regions.end_slope));
+  writer.add_packed<std::uint32_t>("group_of_tri", groups.group_of_triangle);
+  writer.add_packed<std::uint32_t>("node_links", links);
+  writer.add_packed<double>("node_circle", circles);
+  writer.add_packed<std::uint32_t>("region_first", regions.first);
+  writer.add_packed<double>("region_point", regions.points);
+  writer.add_packed<double>("end_slope", regions.end_slope);
   if (groups.has_certified()) add_certified(writer, groups.certified);
   return writer;
 }
@@ -179,11 +232,11 @@ Groups read_groups(const SectionFile& file) {
   if (leaf_count.size() != 1)
     file.fail(fmt::format("{} leaf counts where one was expected", leaf_count.size()));
   groups.leaf_count = leaf_count[0];
-  groups.group_of_triangle = file.copy<std::uint32_t, GroupIndex>("group_of_tri");
+  groups.group_of_triangle = file.unpack<std::uint32_t, GroupIndex>("group_of_tri");
   groups.regions.layout = read_layout(file);
-  groups.regions.first = file.copy<std::uint32_t, std::uint32_t>("region_first");
-  groups.regions.points = file.copy<double, RegionPoint>("region_point");
-  groups.regions.end_slope = file.copy<double, double>("end_slope");
+  groups.regions.first = file.unpack<std::uint32_t, std::uint32_t>("region_first");
+  groups.regions.points = file.unpack<double, RegionPoint>("region_point");
+  groups.regions.end_slope = file.unpack<double, double>("end_slope");
   read_nodes(groups, file);
   check_nodes(groups, file);
   check_group_of_triangle(groups, file);

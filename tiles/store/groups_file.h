@@ -9,7 +9,7 @@ namespace scarp {
 
 inline constexpr FileKind kGroupsKind = {'G', 'R', 'P', 'S'};
 
-/// Groups, their tree and their regions. Borrows the large arrays. Requires the shapes that
+/// Groups, their tree and their regions, packed. Requires the shapes that
 /// core/occlusion/groups.h states (asserted).
 SectionFileWriter groups_writer(const Groups& groups);
 

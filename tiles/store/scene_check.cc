@@ -72,13 +72,14 @@ class SceneCheck {
     const StoredFile* tin_file = scene_.find(tile.id, "tin");
     Tin tin;
     const bool has_tin = tin_file != nullptr && attempt([&] {
-                           tin = read_tin(checked(*tin_file));
+                           SampledTin mesh = read_sampled_tin(checked(*tin_file));
+                           tin = std::move(mesh.tin);
+                           check_samples(*tin_file, mesh.sample_of_vertex);
                            if (const auto broken = check_tin(tin))
                              fault(fmt::format("'{}': {}; build the scene again",
                                                scene_.path_of(*tin_file), *broken));
                          });
     for (const StoredFile& file : tile.files) {
-      if (file.kind == "tin") attempt([&] { check_samples(file); });
       if (file.kind == "horizon") attempt([&] { check_horizon(file, has_tin ? &tin : nullptr); });
       if (file.kind == "groups") attempt([&] { check_groups(file, has_tin ? &tin : nullptr); });
     }
@@ -88,10 +89,10 @@ class SceneCheck {
     return scene_.open(file, Verify::kEverything);
   }
 
-  void check_samples(const StoredFile& file) {
+  void check_samples(const StoredFile& file, const std::vector<std::int64_t>& samples) {
     const RasterGeometry& raster = scene_.description().raster;
     const std::int64_t count = std::int64_t{raster.columns} * raster.rows;
-    for (const std::int64_t sample : read_sample_of_vertex(scene_.open(file))) {
+    for (const std::int64_t sample : samples) {
       if (sample >= count) {
         fault(fmt::format("'{}': sample {} in a raster of {}; build the scene again",
                           scene_.path_of(file), sample, count));

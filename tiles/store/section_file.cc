@@ -306,6 +306,16 @@ std::span<const std::byte> SectionFile::find(std::string_view section, ElementTy
   return found.bytes;
 }
 
+std::vector<std::byte> SectionFile::unpacked(std::string_view section) const {
+  auto bytes = scarp::unpacked(find(section, ElementType::kUint8, 1));
+  if (!bytes) fail_packed(section);
+  return std::move(*bytes);
+}
+
+void SectionFile::fail_packed(std::string_view section) const {
+  fail(fmt::format("section \"{}\" holds nothing that can be unpacked", section));
+}
+
 void SectionFile::fail(const std::string& found) const {
   throw Error(ErrorCode::kCorrupt,
               fmt::format("'{}': {}; the file is damaged or not what it is taken for; restore it "

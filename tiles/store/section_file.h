@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "tiles/store/checksum.h"
+#include "tiles/store/pack.h"
 #include "tiles/store/part_file.h"
 
 /// The one container of every tile file: named arrays of numbers, little-endian, each starting at a
@@ -71,6 +72,13 @@ class SectionFileWriter {
     owned_.push_back(std::make_unique<std::vector<std::byte>>(bytes.begin(), bytes.end()));
     add_bytes(name, element_type<Scalar>(), sizeof(Scalar), sizeof(T) / sizeof(Scalar),
               *owned_.back());
+  }
+
+  /// The values packed by zstd, as a section of bytes: for what is unpacked when it is read.
+  template <class Scalar, class T>
+  void add_packed(std::string_view name, const std::vector<T>& values) {
+    static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(Scalar) == 0);
+    add_owned<std::uint8_t>(name, packed(std::as_bytes(std::span(values))));
   }
 
   /// Writes beside the name, flushes, renames. Errors: those of PartFile; nothing is left behind.
@@ -149,6 +157,18 @@ class SectionFile {
     return values;
   }
 
+  /// What add_packed was given. Error where the bytes are nothing packed, or of no whole number of
+  /// elements. Cost: O(n), about 2 ns a byte.
+  template <class Scalar, class T>
+  std::vector<T> unpack(std::string_view section) const {
+    static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(Scalar) == 0);
+    const std::vector<std::byte> bytes = unpacked(section);
+    if (bytes.size() % sizeof(T) != 0) fail_packed(section);
+    std::vector<T> values(bytes.size() / sizeof(T));
+    if (!bytes.empty()) std::memcpy(values.data(), bytes.data(), bytes.size());
+    return values;
+  }
+
   /// Scalars an element of this section has. Error where there is no such section.
   std::uint32_t width(std::string_view section) const;
 
@@ -172,6 +192,8 @@ class SectionFile {
   const Entry& entry(std::string_view section) const;
   std::span<const std::byte> find(std::string_view section, ElementType type,
                                   std::uint32_t width) const;
+  std::vector<std::byte> unpacked(std::string_view section) const;
+  [[noreturn]] void fail_packed(std::string_view section) const;
 
   std::string name_;
   std::shared_ptr<const void> owner_;  // the mapping, where there is one

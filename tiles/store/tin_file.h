@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/terrain/tin.h"
+#include "tiles/store/mesh_code.h"
 #include "tiles/store/section_file.h"
 
 namespace scarp {
@@ -25,25 +26,27 @@ SectionFileWriter tin_writer(const Tin& tin, std::span<const std::int64_t> sampl
 void write_tin(const std::string& path, const Tin& tin,
                std::span<const std::int64_t> sample_of_vertex, Existing existing);
 
-/// The same in about a third of the bytes, for scenes of many tiles: heights and places in lattice
-/// steps from a corner, corners of triangles and samples as differences, no neighbours, which are
-/// found again. read_tin gives back bit for bit what was written.
+/// The same in about a fifteenth of the bytes, for scenes of many tiles, where every vertex is a
+/// sample: see add_mesh_code, which says what it requires and what it costs. read_sampled_tin gives
+/// back bit for bit what was written.
 ///
-/// Requires besides: vertices within 2^19 m of each other, as those of a tile are (asserted).
-SectionFileWriter compact_tin_writer(const Tin& tin,
-                                     std::span<const std::int64_t> sample_of_vertex);
+/// @param columns    of the raster that samples are numbered in
+/// @param heights_m  [vertices] as the data have them, or empty: they make smaller files only
+SectionFileWriter compact_tin_writer(const Tin& tin, std::span<const std::int64_t> sample_of_vertex,
+                                     std::int64_t columns, std::span<const double> heights_m = {});
 
 /// Errors: those of PartFile.
 void write_compact_tin(const std::string& path, const Tin& tin,
-                       std::span<const std::int64_t> sample_of_vertex, Existing existing);
+                       std::span<const std::int64_t> sample_of_vertex, std::int64_t columns,
+                       std::span<const double> heights_m, Existing existing);
 
 /// The TIN of a file, of either kind, checked so far that no walk over it leaves its arrays:
 /// indices in range, lattice coordinates, counter-clockwise triangles, neighbours mutual and across
-/// the right edge. check_tin finds the rest. Errors: kCorrupt. Cost: O(n).
-Tin read_tin(const SectionFile& file);
+/// the right edge. check_tin finds the rest. Samples are -1 or more, and none where the file does
+/// not tell; the raster's size is not known here. Errors: kCorrupt. Cost: O(n).
+SampledTin read_sampled_tin(const SectionFile& file);
 
-/// [vertices], or empty where the file does not tell. Each is -1 or more; the raster's size is not
-/// known here. Errors: kCorrupt.
-std::vector<std::int64_t> read_sample_of_vertex(const SectionFile& file);
+/// Without the samples.
+Tin read_tin(const SectionFile& file);
 
 }  // namespace scarp

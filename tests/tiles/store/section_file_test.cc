@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
+#include <random>
 
 #include "core/culling/certified_culling.h"
 #include "core/error/error.h"
@@ -34,10 +36,10 @@ std::vector<KindOfFile> kinds_of_file() {
       {"tin", tin_writer(tin, samples).to_bytes(),
        [](const SectionFile& file) {
          // what is read without complaint can be walked: the sanitizers look on
-         Tin read = read_tin(file);
-         (void)check_tin(read);
-         (void)read_sample_of_vertex(file);
+         (void)check_tin(read_sampled_tin(file).tin);
        }},
+      {"compact tin", compact_tin_writer(tin, {{0, 1, 2, 3, 4, 5, 6, 7, 8}}, 3).to_bytes(),
+       [](const SectionFile& file) { (void)check_tin(read_sampled_tin(file).tin); }},
       {"horizon", horizon_writer(test::small_horizons(tin)).to_bytes(),
        [](const SectionFile& file) { read_horizon(file); }},
       {"certified", groups_writer(test::small_certified_groups(tin)).to_bytes(),
@@ -231,13 +233,13 @@ TEST(TinFile, RoundTrip) {
   samples[3] = 1'000'000'000'000;
   write_tin(folder / "t", tin, samples, Existing::kRefuse);
   const SectionFile file = SectionFile::open(folder / "t", Verify::kEverything);
-  const Tin back = read_tin(file);
-  EXPECT_EQ(back.vertices, tin.vertices);
-  EXPECT_EQ(back.triangles, tin.triangles);
-  EXPECT_EQ(back.neighbours, tin.neighbours);
-  EXPECT_EQ(read_sample_of_vertex(file), samples);
-  EXPECT_TRUE(
-      read_sample_of_vertex(SectionFile::from_memory(tin_writer(tin).to_bytes(), "f")).empty());
+  const SampledTin back = read_sampled_tin(file);
+  EXPECT_EQ(back.tin.vertices, tin.vertices);
+  EXPECT_EQ(back.tin.triangles, tin.triangles);
+  EXPECT_EQ(back.tin.neighbours, tin.neighbours);
+  EXPECT_EQ(back.sample_of_vertex, samples);
+  EXPECT_TRUE(read_sampled_tin(SectionFile::from_memory(tin_writer(tin).to_bytes(), "f"))
+                  .sample_of_vertex.empty());
   EXPECT_THROW(write_tin(folder / "t", tin, {}, Existing::kRefuse), Error);
 }
 
@@ -246,44 +248,102 @@ TEST(TinFile, EmptyTin) {
   EXPECT_TRUE(read_tin(SectionFile::from_memory(bytes, "f")).vertices.empty());
 }
 
-TEST(TinFile, CompactRoundTrip) {
+void expect_same(const SampledTin& back, const Tin& tin, const std::vector<std::int64_t>& samples) {
+  EXPECT_EQ(back.tin.vertices, tin.vertices);
+  EXPECT_EQ(back.tin.triangles, tin.triangles);
+  EXPECT_EQ(back.tin.neighbours, tin.neighbours);
+  EXPECT_EQ(back.sample_of_vertex, samples);
+}
+
+TEST(TinFile, CompactRoundTripFarFromEverything) {
+  constexpr std::int64_t kColumns = 2'000'000'000;
   Tin tin = test::grid_tin(40, 30, -12'000);
   for (Position& p : tin.vertices) p = {p.x_m + 0x1p26, p.y_m - 0x1p25 - 0x1p-12, p.z_m};
   std::vector<std::int64_t> samples;
-  for (std::size_t v = 0; v < tin.vertices.size(); ++v)
-    samples.push_back(v % 7 == 6 ? -1 : static_cast<std::int64_t>(v) * 1'000'003);
-  const std::vector<std::byte> bytes = compact_tin_writer(tin, samples).to_bytes();
-  EXPECT_LT(bytes.size(), tin_writer(tin, samples).to_bytes().size() / 2);
-  const SectionFile file = SectionFile::from_memory(bytes, "compact", Verify::kEverything);
-  const Tin again = read_tin(file);
-  EXPECT_EQ(again.vertices, tin.vertices);
-  EXPECT_EQ(again.triangles, tin.triangles);
-  EXPECT_EQ(again.neighbours, tin.neighbours);
-  EXPECT_EQ(read_sample_of_vertex(file), samples);
+  for (std::int64_t row = 0; row < 30; ++row)
+    for (std::int64_t column = 0; column < 40; ++column)
+      samples.push_back((1'000'000'000 + 8 * row) * kColumns + 1'900'000'000 + 8 * column);
+  const Bytes bytes = compact_tin_writer(tin, samples, kColumns).to_bytes();
+  EXPECT_LT(bytes.size(), tin_writer(tin, samples).to_bytes().size() / 10);
+  expect_same(read_sampled_tin(SectionFile::from_memory(bytes, "compact", Verify::kEverything)),
+              tin, samples);
 }
 
-TEST(TinFile, CompactRefusesWhatCannotBeWalked) {
-  const auto refusal = [](Tin tin) {
-    const std::vector<std::int64_t> samples(tin.vertices.size(), 0);
-    const std::vector<std::byte> bytes = compact_tin_writer(tin, samples).to_bytes();
-    try {
-      read_tin(SectionFile::from_memory(bytes, "compact"));
-    } catch (const Error& error) {
-      return std::string(error.what());
+/// A grid of which cells are missing: holes, islands, and vertices where parts touch. Its heights
+/// and places have no order.
+SampledTin torn_grid(std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  const auto columns = static_cast<std::uint32_t>(2 + random() % 12);
+  const auto rows = static_cast<std::uint32_t>(2 + random() % 12);
+  const std::uint64_t keep_of_8 = random() % 9;
+  const Tin whole = test::grid_tin(columns, rows);
+  Tin torn;
+  for (std::size_t t = 0; t < whole.triangles.size(); t += 2)
+    if (random() % 8 < keep_of_8)
+      for (const std::size_t half : {t, t + 1}) torn.triangles.push_back(whole.triangles[half]);
+  SampledTin mesh;
+  std::vector<VertexIndex> new_vertex(whole.vertices.size(), kNone);
+  for (const auto& triangle : torn.triangles)
+    for (const VertexIndex v : triangle) new_vertex[v] = 0;
+  for (VertexIndex v = 0; v < whole.vertices.size(); ++v) {
+    if (new_vertex[v] == kNone) continue;
+    new_vertex[v] = static_cast<VertexIndex>(mesh.tin.vertices.size());
+    const auto shift = [&](double most) {
+      return round_to_lattice(most * static_cast<double>(random() >> 11) * 0x1p-53);
+    };
+    const Position& p = whole.vertices[v];
+    mesh.tin.vertices.push_back({p.x_m + shift(1), p.y_m + shift(1), shift(8000)});
+    mesh.sample_of_vertex.push_back(v);
+  }
+  for (auto triangle : torn.triangles) {
+    for (VertexIndex& v : triangle) v = new_vertex[v];
+    std::ranges::rotate(triangle, std::ranges::min_element(triangle));
+    mesh.tin.triangles.push_back(triangle);
+  }
+  std::ranges::sort(mesh.tin.triangles);
+  connect_neighbours(mesh.tin);
+  return mesh;
+}
+
+TEST(TinFile, CompactRoundTripOfTornMeshes) {
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    SampledTin mesh = torn_grid(seed);
+    std::vector<double> heights_m;  // none, any, whole feet with a few that are not
+    for (std::size_t v = 0; v < mesh.tin.vertices.size() && seed % 3 > 0; ++v) {
+      double& z_m = mesh.tin.vertices[v].z_m;
+      heights_m.push_back(seed % 3 == 1 ? z_m : std::nearbyint(z_m) * 0.3048);
+      if (seed % 3 == 2) z_m = round_to_lattice(1.001 * heights_m.back() + (v % 200 == 7 ? 5 : 0));
     }
-    return std::string();
+    const Bytes bytes =
+        compact_tin_writer(mesh.tin, mesh.sample_of_vertex, 16, heights_m).to_bytes();
+    expect_same(read_sampled_tin(SectionFile::from_memory(bytes, "torn")), mesh.tin,
+                mesh.sample_of_vertex);
+  }
+}
+
+TEST(TinFile, HeightsInWholeMetresTakeFewerBytes) {
+  Tin tin = test::grid_tin(60, 60);
+  std::vector<std::int64_t> samples;
+  std::vector<double> heights_m;
+  std::mt19937_64 random(1);
+  for (Position& p : tin.vertices) {
+    samples.push_back(static_cast<std::int64_t>(samples.size()));
+    heights_m.push_back(static_cast<double>(random() % 64));
+    p.z_m = round_to_lattice(0.99 * heights_m.back() + 1e-5 * p.x_m * p.y_m);
+  }
+  const auto bytes = [&](std::span<const double> heights) {
+    return compact_tin_writer(tin, samples, 60, heights).to_bytes().size();
   };
-  const Tin sound = test::grid_tin(3, 3);
-  EXPECT_EQ(refusal(sound), "");
-  Tin beyond = sound;
-  beyond.triangles[2][1] = 9;
-  EXPECT_NE(refusal(beyond).find("has vertex 9 of 9"), std::string::npos);
-  Tin turned = sound;
-  std::swap(turned.triangles[2][1], turned.triangles[2][2]);
-  EXPECT_NE(refusal(turned).find("counter-clockwise"), std::string::npos);
-  Tin twice = sound;
-  twice.triangles.push_back(twice.triangles[2]);
-  EXPECT_NE(refusal(twice), "");
+  EXPECT_LT(bytes(heights_m) + 3600, bytes({}));  // a byte a vertex
+}
+
+TEST(TinFile, CompactRefusesTrianglesThatTurnOver) {
+  Tin tin = test::grid_tin(3, 3);
+  const std::vector<std::int64_t> samples = {0, 1, 2, 3, 4, 5, 6, 7, 8};
+  std::swap(tin.vertices[4].x_m, tin.vertices[0].x_m);
+  const std::string text = complaint(compact_tin_writer(tin, samples, 3).to_bytes(), read_tin);
+  EXPECT_NE(text.find("counter-clockwise"), std::string::npos) << text;
 }
 
 TEST(TinFile, RefusesWhatCannotBeWalked) {
