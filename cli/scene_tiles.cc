@@ -34,6 +34,37 @@ bool is_beside(const TileContents& contents, const Position& eye, const ViewRang
 
 }  // namespace
 
+bool may_meet(const TileContents& contents, const ViewPlan& plan) {
+  const double dx =
+      std::max({contents.low[0] - plan.eye.x_m, plan.eye.x_m - contents.high[0], 0.0});
+  const double dy =
+      std::max({contents.low[1] - plan.eye.y_m, plan.eye.y_m - contents.high[1], 0.0});
+  if (std::hypot(dx, dy) > plan.radius_m + kBesideM) return false;
+  return !plan.view || !is_beside(contents, plan.eye, *plan.view);
+}
+
+ViewPlan view_towards(const Position& eye, const TileContents& contents) {
+  ViewPlan plan{eye, 0, {}};
+  const double middle_x_m = (contents.low[0] + contents.high[0]) / 2;
+  const double middle_y_m = (contents.low[1] + contents.high[1]) / 2;
+  const double middle_rad = std::atan2(middle_y_m - eye.y_m, middle_x_m - eye.x_m);
+  double right_rad = 0, left_rad = 0;  // of the middle
+  for (const double x : {contents.low[0] - kBesideM, contents.high[0] + kBesideM}) {
+    for (const double y : {contents.low[1] - kBesideM, contents.high[1] + kBesideM}) {
+      plan.radius_m = std::max(plan.radius_m, std::hypot(x - eye.x_m, y - eye.y_m));
+      const double turn_rad =
+          std::remainder(std::atan2(y - eye.y_m, x - eye.x_m) - middle_rad, 2 * M_PI);
+      right_rad = std::min(right_rad, turn_rad);
+      left_rad = std::max(left_rad, turn_rad);
+    }
+  }
+  const bool is_inside =
+      eye.x_m >= contents.low[0] - 2 * kBesideM && eye.x_m <= contents.high[0] + 2 * kBesideM &&
+      eye.y_m >= contents.low[1] - 2 * kBesideM && eye.y_m <= contents.high[1] + 2 * kBesideM;
+  if (!is_inside) plan.view = ViewRange{middle_rad + right_rad, middle_rad + left_rad};
+  return plan;
+}
+
 SceneTiles::SceneTiles(const std::string& path)
     : scene_(open_scene(path)), frame_(frame_of(scene_.description())) {
   GroupIndex groups = 0;
@@ -47,14 +78,7 @@ SceneTiles::SceneTiles(const std::string& path)
 }
 
 bool SceneTiles::meets(std::size_t i, const ViewPlan& plan) const {
-  if (!tile(i).contents) return true;
-  const TileContents& contents = *tile(i).contents;
-  const double dx =
-      std::max({contents.low[0] - plan.eye.x_m, plan.eye.x_m - contents.high[0], 0.0});
-  const double dy =
-      std::max({contents.low[1] - plan.eye.y_m, plan.eye.y_m - contents.high[1], 0.0});
-  if (std::hypot(dx, dy) > plan.radius_m + kBesideM) return false;
-  return !plan.view || !is_beside(contents, plan.eye, *plan.view);
+  return !tile(i).contents || may_meet(*tile(i).contents, plan);
 }
 
 Tin SceneTiles::read_tin(std::size_t i) {

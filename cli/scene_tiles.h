@@ -17,6 +17,12 @@ struct ViewPlan {
   std::optional<ViewRange> view;  ///< none: all around
 };
 
+/// Whether a tile may have ground in a part of the plane. Side: never false where it has.
+bool may_meet(const TileContents& contents, const ViewPlan& plan);
+
+/// The part of the plane that lines from an eye to a tile's ground lie in.
+ViewPlan view_towards(const Position& eye, const TileContents& contents);
+
 /// The finest tiles of a scene, opened when they are asked for. Reads scene.json only, until then.
 class SceneTiles {
  public:

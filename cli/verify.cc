@@ -114,6 +114,22 @@ std::vector<VerifyCounts> verify_culling(const TinIndex& index, const Groups& gr
   return all;
 }
 
+void add(std::vector<VerifyCounts>& all, const std::vector<VerifyCounts>& more) {
+  if (all.empty()) {
+    all = more;
+    return;
+  }
+  for (std::size_t i = 0; i < std::min(all.size(), more.size()); ++i) {
+    VerifyCounts& to = all[i];
+    to.eyes += more[i].eyes;
+    to.triangles += more[i].triangles;
+    to.hidden += more[i].hidden;
+    to.in_hidden_groups += more[i].in_hidden_groups;
+    to.culled += more[i].culled;
+    to.falsely_culled += more[i].falsely_culled;
+  }
+}
+
 VerifyPlan sampled_plan(std::size_t triangles) {
   constexpr std::size_t kMostJudged = 60'000;  // some tenths of a second on one core
   VerifyPlan plan;

@@ -52,6 +52,9 @@ std::vector<VerifyCounts> verify_culling(const TinIndex& index, const Groups& gr
                                          const std::vector<std::unique_ptr<CullingMethod>>& methods,
                                          const VerifyPlan& plan, const Progress& progress);
 
+/// Adds counts of the same methods and heights; takes them where there are none yet.
+void add(std::vector<VerifyCounts>& all, const std::vector<VerifyCounts>& more);
+
 /// The plan for build's report: few eyes, and so few groups that it costs next to nothing.
 VerifyPlan sampled_plan(std::size_t triangles);
 

@@ -4,7 +4,6 @@
 #include <sys/stat.h>
 
 #include <algorithm>
-#include <bit>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -99,6 +98,10 @@ class Planner {
       for (const TileId& tile : scheme_.tiles(level))
         (level == scheme_.finest_level() ? step.inputs : step.outputs)
             .push_back(tile_file(tile, "range"));
+    // --observer stands on ground, which is to be known before the long work.
+    if (plan_.options.observer)
+      for (const TileId& tile : scheme_.tiles(scheme_.finest_level()))
+        step.inputs.push_back(tile_file(tile, "tin"));
     ranges_ = plan_.steps.size();
     add(std::move(step));
   }
@@ -174,13 +177,21 @@ class Planner {
                                  samples_of(tile) * (kBytesPerGroupSample +
                                                      kBytesPerSeenVertex * kVertexShare * seen));
   }
-  /// Pictures, and a tile of the groups' layer.
+  /// Pictures, or the tiles that are judged or looked over at once.
   std::uint64_t finish_bytes() const {
     const double triangles =
         std::min(static_cast<double>(kMostPreviewTriangles),
                  2.0 * scheme_.columns() * static_cast<double>(scheme_.rows()));
-    return kBytesOfProcess + kBytesOfPictures +
-           static_cast<std::uint64_t>(kBytesPerDrawnTriangle * triangles);
+    const double of_pictures =
+        static_cast<double>(kBytesOfPictures) + kBytesPerDrawnTriangle * triangles;
+    const std::int32_t finest = scheme_.finest_level();
+    const double across = scheme_.tiles_across(finest), down = scheme_.tiles_down(finest);
+    const double around = std::min(3.0, across) * std::min(3.0, down);
+    const double between = std::min(across * down, 2 * std::max(across, down) + 8);
+    const double tiles = plan_.options.observer ? std::max(around, between) : around;
+    const double of_tiles =
+        tiles * kBytesPerSeenVertex * kVertexShare * samples_of(TileId{finest, 0, 0});
+    return kBytesOfProcess + static_cast<std::uint64_t>(std::max(of_pictures, of_tiles));
   }
   double cost_of_groups(const TileId& tile) const {
     const int fans = plan_.options.fans.value_or(build_accuracy(plan_.options.accuracy).fans);
@@ -225,6 +236,11 @@ void check_memory(const BuildPlan& plan, const BuildOptions& options) {
         fmt::format("{} need about {} with {}, which takes them in one piece, and --memory "
                     "allows {}; raise --memory, or leave {} out",
                     size, gibibytes(largest->memory_bytes), option, gibibytes(allowed), option));
+  if (options.observer && largest->kind == StepKind::kFinish)
+    throw Error(ErrorCode::kResource,
+                fmt::format("{} need about {} for the viewshed of --observer, and --memory allows "
+                            "{}; raise --memory, or leave it out and ask scarp viewshed",
+                            size, gibibytes(largest->memory_bytes), gibibytes(allowed)));
   for (BuildOptions smaller = options; smaller.tile_samples > kLeastTileSamples;) {
     smaller.tile_samples /= 2;
     smaller.common.memory_budget_bytes = 0;
@@ -309,13 +325,6 @@ BuildPlan make_plan(const BuildOptions& options) {
   if (option_for_one_tile(options) != nullptr)
     while (side < std::max(dem.columns, dem.rows) - 1) side *= 2;
   plan.scheme = TileScheme(dem.columns, dem.rows, side);
-  if (options.observer && !plan.has_one_tile())
-    throw Error(
-        ErrorCode::kUsage,
-        fmt::format(
-            "--observer: a scene of several tiles has no layers/viewshed.tif; leave "
-            "it out and ask scarp viewshed, or give --tile-samples {} for one tile",
-            std::bit_ceil(static_cast<std::uint32_t>(std::max(dem.columns, dem.rows) - 1))));
   const CellMeasures cells = measure_cells(dem);
   plan.max_error_m = options.max_error_m.value_or(build_accuracy(options.accuracy).error_cells *
                                                   std::min(cells.cell_x_m, cells.cell_y_m));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "cli/build/finest_tiles.h"
 #include "cli/build/layers.h"
 #include "cli/build/options_json.h"
 #include "cli/build/report.h"
@@ -23,6 +24,18 @@ namespace {
 
 using nlohmann::json;
 
+/// The raster of a tile's samples, without heights.
+Dem part_of(const Dem& dem, const TileWindow& window) {
+  Dem part;
+  part.columns = window.columns;
+  part.rows = window.rows;
+  part.geotransform = dem.geotransform;
+  part.geotransform[0] += window.first_column * dem.geotransform[1];
+  part.geotransform[3] += window.first_row * dem.geotransform[5];
+  part.frame = dem.frame;
+  return part;
+}
+
 /// The last step: from finished tiles to a scene under its name.
 class Finish {
  public:
@@ -41,7 +54,12 @@ class Finish {
       run_.part("preview", [&](const Progress&) { draw(tin_, groups_); });
       run_.check_sources();
     } else {
-      run_.part("layers", [&](const Progress& p) { join_groups_layer(p); });
+      tiles_.emplace(run_);
+      run_.part("verify", [&](const Progress& p) { verify_blocks(p); });
+      run_.part("layers", [&](const Progress& p) {
+        join_groups_layer(p);
+        if (plan_.options.observer) join_viewshed_layer(p);
+      });
       run_.part("preview", [&](const Progress&) { draw(ground_for_picture(), {}); });
     }
     write_report();
@@ -77,6 +95,29 @@ class Finish {
     const auto methods = culling_methods(groups_, has_stewart(plan_.options.horizon));
     verified_ = verify_culling(*index_, groups_, frame_, methods,
                                sampled_plan(tin_.triangles.size()), progress);
+  }
+
+  /// The same for a scene of several tiles: an eye in each of some blocks of tiles, which judges
+  /// the ground of its block. Lines between places of a rectangle stay in it.
+  void verify_blocks(const Progress& progress) {
+    const std::vector<FinestTiles::Tile>& tiles = tiles_->tiles();
+    SplitMix64 random(VerifyPlan().seed);
+    constexpr int kBlocks = 3;
+    for (int block = 0; block < kBlocks; ++block) {
+      const auto middle =
+          static_cast<std::size_t>(random.unit() * static_cast<double>(tiles.size()));
+      const std::vector<std::size_t> numbers = tiles_->tiles_around(middle);
+      const Tin ground = tiles_->ground_of(numbers);
+      const Groups groups = tiles_->groups_of(numbers);
+      const TinIndex index(ground);
+      VerifyPlan plan = sampled_plan(ground.triangles.size());
+      plan.eyes = 1;
+      plan.seed += static_cast<std::uint64_t>(block);
+      add(verified_,
+          verify_culling(index, groups, frame_, culling_methods(groups, false), plan, {}));
+      verified_tiles_ += numbers.size();
+      if (progress) progress(static_cast<double>(block + 1) / kBlocks);
+    }
   }
 
   RasterLayer groups_layer() const {
@@ -124,7 +165,39 @@ class Finish {
     const Position eye = GeoFrame::Placer(frame_).place(*observer_);
     const std::vector<std::uint8_t> seen =
         viewshed_of_samples(source_.dem(), *index_, eye, progress);
-    RasterLayer viewshed = layer_over(source_.dem(), std::span(seen), "visible");
+    RasterLayer layer = viewshed_layer();
+    layer.samples = std::span(seen);
+    add_layer("layers/viewshed.tif", "cog",
+              [&](const std::string& path) { write_geotiff_cog(path, layer, Existing::kReplace); });
+  }
+
+  /// The same from tile to tile, each with the tiles between it and the eye: what lies in the way
+  /// of a line is all that its answer depends on.
+  void join_viewshed_layer(const Progress& progress) {
+    const json at = run_.facts_of(StepKind::kRanges, {})["observer"];
+    observer_ = MapPoint{at[0].get<double>(), at[1].get<double>(), at[2].get<double>()};
+    const Position eye = GeoFrame::Placer(frame_).place(*observer_);
+    const std::vector<FinestTiles::Tile>& tiles = tiles_->tiles();
+    const auto give = [&](const TakePiece& take) {
+      for (std::size_t i = 0; i < tiles.size(); ++i) {
+        const Tin ground = tiles_->ground_of(tiles_->tiles_towards(eye, i));
+        const TileWindow own = plan_.scheme.window(tiles[i].id);
+        const std::vector<std::uint8_t> seen =
+            viewshed_of_samples(part_of(source_.dem(), own), TinIndex(ground), eye, {});
+        const std::vector<std::int32_t> values(seen.begin(), seen.end());
+        take(own.first_column, own.first_row, own.columns, own.rows, values);
+        if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(tiles.size()));
+      }
+    };
+    add_layer("layers/viewshed.tif", "cog", [&](const std::string& path) {
+      write_geotiff_cog_in_pieces(path, run_.writer().path_for("work/viewshed.tif"),
+                                  viewshed_layer(), give, Existing::kReplace);
+    });
+  }
+
+  /// Without its samples.
+  RasterLayer viewshed_layer() const {
+    RasterLayer viewshed = layer_over(source_.dem(), std::span<const std::uint8_t>(), "visible");
     viewshed.nodata = kUnknownValue;
     viewshed.colours = {{{70, 80, 96, 255}, {250, 196, 60, 255}}};
     viewshed.metadata["SURFACE"] = "tin";
@@ -134,9 +207,7 @@ class Finish {
     viewshed.metadata["REFRACTION"] = fmt::format("{:g}", plan_.options.dem.refraction);
     viewshed.metadata["EARTH"] = is_flat() ? "flat" : "ellipsoid";
     viewshed.metadata["VALUES"] = "1 visible, 0 hidden, 255 unknown";
-    add_layer("layers/viewshed.tif", "cog", [&](const std::string& path) {
-      write_geotiff_cog(path, viewshed, Existing::kReplace);
-    });
+    return viewshed;
   }
 
   void write_polygons() {
@@ -191,6 +262,7 @@ class Finish {
   void write_report() {
     json report = build_report(run_, observer_);
     report["verify"] = to_json(verified_);
+    if (verified_tiles_ > 0) report["verified_tiles"] = verified_tiles_;
     const std::string text = report.dump(2) + "\n";
     add_layer("report.json", "json", [&](const std::string& path) {
       write_file(path, std::as_bytes(std::span(text)), Existing::kReplace);
@@ -278,15 +350,6 @@ class Finish {
         .value();
   }
 
-  static TileContents contents_of(const json& facts) {
-    TileContents contents;
-    contents.low = facts["low"].get<std::array<double, 3>>();
-    contents.high = facts["high"].get<std::array<double, 3>>();
-    contents.vertices = facts["vertices"].get<std::uint64_t>();
-    contents.triangles = facts["triangles"].get<std::uint64_t>();
-    return contents;
-  }
-
   template <class Write>
   void add_layer(const std::string& name, const std::string& kind, const Write& write) {
     layers_.push_back(run_.make(name, kind, write));
@@ -301,6 +364,8 @@ class Finish {
   std::vector<StoredFile> layers_;
   std::optional<MapPoint> observer_;
   std::vector<VerifyCounts> verified_;
+  std::optional<FinestTiles> tiles_;  // of several
+  std::size_t verified_tiles_ = 0;
   // Of a scene of one tile:
   Tin tin_;
   Groups groups_;

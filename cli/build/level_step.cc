@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "cli/build/finest_tiles.h"
 #include "cli/build/step_run.h"
 #include "cli/loaded_scene.h"
 #include "core/terrain/occluder.h"
@@ -142,6 +143,11 @@ void ranges_of_scene(StepRun& run) {
         });
       }
       finer = std::move(coarser);
+    }
+    if (run.plan().options.observer) {  // there may be no such place: before the long work
+      FinestTiles tiles(run);
+      const MapPoint at = place_observer(tiles, run.plan().options, *run.open_source().dem().frame);
+      run.facts["observer"] = {at.x, at.y, at.height_m};
     }
   });
 }

@@ -142,7 +142,8 @@ void mesh_of_tile(StepRun& run) {
     if (mesh.tin.triangles.empty()) return;
     run.facts.update(facts_of_mesh(mesh));
     run.facts["highest"] = highest_vertex(mesh.tin, *source.dem().frame);
-    if (plan.options.observer)  // there may be no such place: before the long work
+    if (plan.options.observer &&
+        plan.has_one_tile())  // there may be no such place: before the long work
       resolve(*plan.options.observer, plan.options.crs, *source.dem().frame, TinIndex(mesh.tin));
     run.make(tile_file_name(name, "tin"), "tin", [&](const std::string& path) {
       if (plan.has_one_tile())

@@ -30,7 +30,7 @@ json read_json(const std::string& path) {
 }
 
 /// Mountains with a lake of void, 30 m, of a size that no tile divides.
-constexpr int kColumns = 201, kRows = 165;
+constexpr int kColumns = 141, kRows = 118;
 std::string write_dem(const std::string& path) {
   GDALAllRegister();
   GDALDataset* dataset = GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
@@ -46,7 +46,7 @@ std::string write_dem(const std::string& path) {
     std::vector<std::int16_t> heights(kColumns);
     ground.row(700, 900 + row, heights);
     for (int column = 0; column < kColumns; ++column)
-      if ((column - 100) * (column - 100) + (row - 90) * (row - 90) < 200)
+      if ((column - 80) * (column - 80) + (row - 70) * (row - 70) < 120)
         heights[static_cast<std::size_t>(column)] = -1;
     EXPECT_EQ(dataset->GetRasterBand(1)->RasterIO(GF_Write, 0, row, kColumns, 1, heights.data(),
                                                   kColumns, 1, GDT_Int16, 0, 0),
@@ -69,7 +69,7 @@ std::map<std::string, std::string> files_of(const std::string& scene) {
 
 constexpr char kQuick[] =
     " --max-error 6 --fans 32 --patch 2 --group-triangles 40 --min-group-triangles 10 "
-    "--tile-samples 64 ";
+    "--tile-samples 64 --observer=401900,5198200,40 ";
 
 /// One DEM and one scene of 4 x 3 tiles for all tests that only read it.
 class TiledBuild : public testing::Test {
@@ -94,7 +94,7 @@ class TiledBuild : public testing::Test {
 
 TEST_F(TiledBuild, ReportTellsTilesLevelsAndWhatRefinementSaved) {
   const json report = json::parse(built_.output);
-  EXPECT_EQ(report["tiles"]["finest"], 12);
+  EXPECT_EQ(report["tiles"]["finest"], 6);
   EXPECT_EQ(report["tiles"]["levels"], 3);
   EXPECT_EQ(report["raster"]["known_samples"], report["inputs"][0]["samples"]);
   EXPECT_LE(report["mesh"]["error_over_surface_m"], 6);
@@ -109,8 +109,29 @@ TEST_F(TiledBuild, ReportTellsTilesLevelsAndWhatRefinementSaved) {
   EXPECT_GT(report["bytes_written"], 0);
   EXPECT_GT(report["peak_memory_bytes"], 1 << 20);
   const json scene = read_json(scene_ + "/scene.json");
-  EXPECT_EQ(scene["tiles"].size(), 12U + 4 + 1);
+  EXPECT_EQ(scene["tiles"].size(), 6U + 2 + 1);
   EXPECT_FALSE(fs::exists(scene_ + "/work"));
+}
+
+TEST_F(TiledBuild, ReportJudgesBlocksOfTiles) {
+  const json report = json::parse(built_.output);
+  EXPECT_GE(report["verified_tiles"], 3 * 4);
+  EXPECT_LE(report["verified_tiles"], 3 * 9);
+  ASSERT_EQ(report["verify"].size(), 2U);
+  for (const json& row : report["verify"]) {
+    EXPECT_EQ(row["eyes"], 3);
+    EXPECT_GT(row["triangles"], 1000);
+    EXPECT_GE(row["in_hidden_groups"], row["culled"]);
+    EXPECT_EQ(row["falsely_culled"], 0);
+  }
+}
+
+TEST_F(TiledBuild, AnObserverWithoutGroundIsSaidBeforeTheLongWork) {
+  const RunResult run = run_scarp("$SCARP build " + dem_ + " -o " + folder_->path("void.scene") +
+                                  " --tile-samples 64 --fans 32 --observer=402415,5197885,5000asl");
+  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_NE(run.errors.find("no ground is known there"), std::string::npos) << run.errors;
+  EXPECT_FALSE(fs::exists(folder_->path("void.scene")));
 }
 
 TEST_F(TiledBuild, CullsNothingThatIsSeen) {
@@ -153,12 +174,12 @@ TEST_F(TiledBuild, SameBitsForAnyThreadCountAndMemory) {
 TEST_F(TiledBuild, CullReadsTheTilesThatItNeeds) {
   const std::string ask = "$SCARP cull " + scene_ + " --camera=401900,5198200,40 --json";
   const json all = json::parse(run_scarp(ask).output);
-  EXPECT_EQ(all["tiles"], 12);
-  EXPECT_EQ(all["tiles_read"], 12);
+  EXPECT_EQ(all["tiles"], 6);
+  EXPECT_EQ(all["tiles_read"], 6);
   const json near = json::parse(run_scarp(ask + " --max-distance 500").output);
   EXPECT_LE(near["tiles_read"], 4);
   const json east = json::parse(run_scarp(ask + " --azimuth 90 --field-of-view 60").output);
-  EXPECT_LT(east["tiles_read"], 12);
+  EXPECT_LT(east["tiles_read"], 6);
   const auto groups = all["visible_groups"].get<std::set<int>>();
   for (const json* part : {&near, &east}) {
     EXPECT_GT((*part)["visible_groups"].size(), 0U);
@@ -196,10 +217,14 @@ TEST_F(TiledBuild, ViewshedReadsTheTilesThatItReaches) {
   ASSERT_EQ(near_run.exit_code, 0) << near_run.errors;
   const json near = json::parse(near_run.output);
   const json all = json::parse(run_scarp(ask + " -o " + all_file).output);
-  EXPECT_EQ(all["tiles_read"], 12);
+  EXPECT_EQ(all["tiles_read"], 6);
   EXPECT_LE(near["tiles_read"], 4);
   EXPECT_LT(near["columns"], kColumns);
   const auto whole = values_by_place(all_file);
+  std::size_t unlike = 0;
+  for (const auto& [place, value] : values_by_place(scene_ + "/layers/viewshed.tif"))
+    unlike += value != whole.at(place);
+  EXPECT_EQ(unlike, 0U);
   int visible = 0;
   for (const auto& [place, value] : values_by_place(near_file)) {
     const double dx = static_cast<double>(place.first - 401'900);
@@ -324,7 +349,7 @@ TEST_F(TiledBuild, AFullDiskIsOneLineAndWhatWasFinishedIsGoneOnWith) {
   EXPECT_EQ(otherwise.exit_code, 1);
   EXPECT_NE(otherwise.errors.find("other options"), std::string::npos) << otherwise.errors;
   const auto before = records_in(scene + ".part/work/steps");
-  EXPECT_EQ(before.size(), 31U);  // all but the last
+  EXPECT_EQ(before.size(), 17U);  // all but the last
   ASSERT_EQ(run_scarp(build(scene) + "--resume").exit_code, 0);
   EXPECT_EQ(files_of(scene), files_of(scene_));
   EXPECT_EQ(run_scarp(build(scene) + "--resume").exit_code, 0);  // nothing left to do
@@ -402,9 +427,10 @@ TEST_F(TiledBuild, MemoryThatIsTooSmallIsSaidBeforeTheWork) {
   EXPECT_EQ(whole.exit_code, 1);
   EXPECT_NE(whole.errors.find("--vertices, which takes them in one piece"), std::string::npos)
       << whole.errors;
-  const RunResult viewshed = run_scarp(build + "--tile-samples 256 --observer 4e5,52e5");
-  EXPECT_EQ(viewshed.exit_code, 2);
-  EXPECT_NE(viewshed.errors.find("--observer"), std::string::npos) << viewshed.errors;
+  const RunResult viewshed = run_scarp(build + "--tile-samples 256 --observer=4e5,52e5");
+  EXPECT_EQ(viewshed.exit_code, 1);
+  EXPECT_NE(viewshed.errors.find("for the viewshed of --observer"), std::string::npos)
+      << viewshed.errors;
   EXPECT_FALSE(fs::exists(scene + ".part"));
 }
 

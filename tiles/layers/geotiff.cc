@@ -190,8 +190,8 @@ GDALDatasetUniquePtr piece_dataset(const std::string& work_path, const RasterLay
   options.SetNameValue("ZLEVEL", "1");
   options.SetNameValue("BIGTIFF", "IF_SAFER");
   options.SetNameValue("SPARSE_OK", "TRUE");
-  GDALDatasetUniquePtr dataset(
-      driver->Create(work_path.c_str(), layer.columns, layer.rows, 1, GDT_Int32, options.List()));
+  GDALDatasetUniquePtr dataset(driver->Create(work_path.c_str(), layer.columns, layer.rows, 1,
+                                              data_of(layer.samples).type, options.List()));
   if (!dataset) session.fail(path);
   describe(*dataset, layer, path);
   return dataset;
@@ -278,7 +278,7 @@ void write_geotiff_cog_in_pieces(const std::string& path, const std::string& wor
   if (!pieces) session.fail(path);
   GDALDriver* driver = GetGDALDriverManager()->GetDriverByName("COG");
   if (driver == nullptr) session.fail(path);
-  CPLStringList options = cog_options("YES", "NEAREST");
+  CPLStringList options = cog_options(data_of(layer.samples).predictor, "NEAREST");
   GDALDatasetUniquePtr cog(driver->CreateCopy(file.part_path().c_str(), pieces.get(), TRUE,
                                               options.List(), nullptr, nullptr));
   if (!cog) session.fail(path);

@@ -59,7 +59,7 @@ void write_geotiff_cog(const std::string& path, const RasterLayer& layer, Existi
 using TakePiece = std::function<void(std::int32_t column, std::int32_t row, std::int32_t columns,
                                      std::int32_t rows, std::span<const std::int32_t> samples)>;
 
-/// The same for a layer of int32 that is never held whole: `give` hands over its pieces.
+/// The same for a layer of int32 or uint8 that is never held whole: `give` hands over its pieces.
 /// Later ones lie on top, except where they are nodata; what none covers is nodata. The layer's own
 /// samples are left empty, and it has one band and nodata (asserted).
 /// @param work_path  a file for the pieces, which is removed again

@@ -74,10 +74,10 @@ class SceneCheck {
     const bool has_tin = tin_file != nullptr && attempt([&] {
                            SampledTin mesh = read_sampled_tin(checked(*tin_file));
                            tin = std::move(mesh.tin);
-                           check_samples(*tin_file, mesh.sample_of_vertex);
                            if (const auto broken = check_tin(tin))
                              fault(fmt::format("'{}': {}; build the scene again",
                                                scene_.path_of(*tin_file), *broken));
+                           check_samples(*tin_file, mesh.sample_of_vertex);
                          });
     for (const StoredFile& file : tile.files) {
       if (file.kind == "horizon") attempt([&] { check_horizon(file, has_tin ? &tin : nullptr); });
