@@ -14,6 +14,7 @@
 #include "cli/verify.h"
 #include "core/raster/preview.h"
 #include "core/terrain/weld.h"
+#include "ingest/dem/ground_placement.h"
 #include "tiles/layers/png_image.h"
 #include "tiles/store/groups_file.h"
 #include "tiles/store/tile_raster_file.h"
@@ -23,18 +24,6 @@ namespace scarp {
 namespace {
 
 using nlohmann::json;
-
-/// The raster of a tile's samples, without heights.
-Dem part_of(const Dem& dem, const TileWindow& window) {
-  Dem part;
-  part.columns = window.columns;
-  part.rows = window.rows;
-  part.geotransform = dem.geotransform;
-  part.geotransform[0] += window.first_column * dem.geotransform[1];
-  part.geotransform[3] += window.first_row * dem.geotransform[5];
-  part.frame = dem.frame;
-  return part;
-}
 
 /// The last step: from finished tiles to a scene under its name.
 class Finish {
@@ -164,7 +153,8 @@ class Finish {
   void write_viewshed_layer(const Progress& progress) {
     const Position eye = GeoFrame::Placer(frame_).place(*observer_);
     const std::vector<std::uint8_t> seen =
-        viewshed_of_samples(source_.dem(), *index_, eye, progress);
+        viewshed_of_samples(ground_placement(source_.dem()), source_.dem().columns,
+                            plan_.scheme.window(TileId{}), *index_, eye, progress);
     RasterLayer layer = viewshed_layer();
     layer.samples = std::span(seen);
     add_layer("layers/viewshed.tif", "cog",
@@ -177,13 +167,14 @@ class Finish {
     const json at = run_.facts_of(StepKind::kRanges, {})["observer"];
     observer_ = MapPoint{at[0].get<double>(), at[1].get<double>(), at[2].get<double>()};
     const Position eye = GeoFrame::Placer(frame_).place(*observer_);
+    const GroundGrid::Placement places = ground_placement(source_.dem());
     const std::vector<FinestTiles::Tile>& tiles = tiles_->tiles();
     const auto give = [&](const TakePiece& take) {
       for (std::size_t i = 0; i < tiles.size(); ++i) {
         const Tin ground = tiles_->ground_of(tiles_->tiles_towards(eye, i));
         const TileWindow own = plan_.scheme.window(tiles[i].id);
         const std::vector<std::uint8_t> seen =
-            viewshed_of_samples(part_of(source_.dem(), own), TinIndex(ground), eye, {});
+            viewshed_of_samples(places, source_.dem().columns, own, TinIndex(ground), eye, {});
         const std::vector<std::int32_t> values(seen.begin(), seen.end());
         take(own.first_column, own.first_row, own.columns, own.rows, values);
         if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(tiles.size()));

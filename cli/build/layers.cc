@@ -5,7 +5,6 @@
 
 #include "core/threads/parallel_for.h"
 #include "core/viewshed/tin_viewshed.h"
-#include "ingest/dem/ground_placement.h"
 #include "tiles/layers/outline.h"
 
 namespace scarp {
@@ -58,17 +57,30 @@ std::vector<std::int32_t> group_of_samples(const std::vector<TriangleIndex>& tri
   return values;
 }
 
-std::vector<std::uint8_t> viewshed_of_samples(const Dem& dem, const TinIndex& index,
-                                              const Position& eye, const Progress& progress) {
-  GroundGrid samples(dem.columns, dem.rows, ground_placement(dem));
+std::vector<std::uint8_t> viewshed_of_samples(const GroundGrid::Placement& raster,
+                                              std::int32_t raster_columns, const TileWindow& window,
+                                              const TinIndex& index, const Position& eye,
+                                              const Progress& progress) {
+  PartPlacement part = part_of(raster, raster_columns, window.first_column, window.first_row,
+                               window.columns, window.rows);
+  GroundGrid samples(part.columns, part.rows, std::move(part.placement));
   stand_on(index, samples);
-  std::vector<std::uint8_t> values(static_cast<std::size_t>(dem.columns) *
-                                   static_cast<std::size_t>(dem.rows));
+  SampleWindow own = whole_window(samples);
+  own.first_column = window.first_column - part.first_column;
+  own.first_row = window.first_row - part.first_row;
+  std::vector<Seen> seen(static_cast<std::size_t>(part.columns) *
+                         static_cast<std::size_t>(part.rows));
+  tin_viewshed(index, samples, eye, 0, own, seen, progress);
   static_assert(static_cast<std::uint8_t>(Seen::kVisible) == kVisibleValue &&
                 static_cast<std::uint8_t>(Seen::kHidden) == kHiddenValue &&
                 static_cast<std::uint8_t>(Seen::kUnknown) == kUnknownValue);
-  tin_viewshed(index, samples, eye, 0, whole_window(samples),
-               std::span(reinterpret_cast<Seen*>(values.data()), values.size()), progress);
+  std::vector<std::uint8_t> values;
+  values.reserve(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows));
+  for (std::int32_t row = own.first_row; row <= own.last_row; ++row)
+    for (std::int32_t column = own.first_column; column <= own.last_column; ++column)
+      values.push_back(static_cast<std::uint8_t>(
+          seen[static_cast<std::size_t>(row) * static_cast<std::size_t>(part.columns) +
+               static_cast<std::size_t>(column)]));
   return values;
 }
 

@@ -6,7 +6,9 @@
 
 #include "core/occlusion/groups.h"
 #include "core/sight/tin_index.h"
+#include "core/terrain/ground_grid.h"
 #include "core/terrain/sample_grid.h"
+#include "core/terrain/tile_scheme.h"
 #include "core/threads/progress.h"
 #include "ingest/dem/dem.h"
 #include "tiles/layers/geopackage.h"
@@ -34,9 +36,13 @@ std::vector<std::int32_t> group_of_samples(const std::vector<TriangleIndex>& tri
 
 /// What an eye sees of the TIN at each sample, by the judge, as `scarp viewshed SCENE` has it.
 /// Targets stand on the TIN, rounded up to the lattice. Side: a target is never lower than the
-/// ground, by at most two lattice steps higher. [rows * columns] of the values above
-std::vector<std::uint8_t> viewshed_of_samples(const Dem& dem, const TinIndex& index,
-                                              const Position& eye, const Progress& progress);
+/// ground, by at most two lattice steps higher.
+/// @param raster  places of all samples of the raster, of which the window's are asked for
+/// @return [window.rows * window.columns] of the values above
+std::vector<std::uint8_t> viewshed_of_samples(const GroundGrid::Placement& raster,
+                                              std::int32_t raster_columns, const TileWindow& window,
+                                              const TinIndex& index, const Position& eye,
+                                              const Progress& progress);
 
 /// Outlines of the groups in map coordinates, with what the polygons layer tells about each.
 /// @param heights_m  of the vertices, above the datum of the data

@@ -196,4 +196,48 @@ bool GroundGrid::set_heights(std::int32_t row, std::int32_t first_column,
   return within;
 }
 
+namespace {
+
+/// A rectangle of an array of rows.
+template <class T>
+std::vector<T> cut(const std::vector<T>& from, std::int32_t stride, std::int32_t first_column,
+                   std::int32_t first_row, std::int32_t columns, std::int32_t rows) {
+  std::vector<T> part;
+  part.reserve(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+  for (std::int32_t row = first_row; row < first_row + rows; ++row) {
+    const auto begin = from.begin() + std::ptrdiff_t{row} * stride + first_column;
+    part.insert(part.end(), begin, begin + columns);
+  }
+  return part;
+}
+
+}  // namespace
+
+PartPlacement part_of(const GroundGrid::Placement& whole, std::int32_t raster_columns,
+                      std::int32_t first_column, std::int32_t first_row, std::int32_t columns,
+                      std::int32_t rows) {
+  PartPlacement part{{}, first_column, first_row, columns, rows};
+  if (const auto* separable = std::get_if<SeparablePlacement>(&whole)) {
+    part.placement =
+        SeparablePlacement{cut(separable->x_of_column_m, 0, first_column, 0, columns, 1),
+                           cut(separable->y_of_row_m, 0, first_row, 0, rows, 1)};
+  } else if (const auto* places = std::get_if<ExplicitPlacement>(&whole)) {
+    part.placement =
+        ExplicitPlacement{cut(places->x_m, raster_columns, first_column, first_row, columns, rows),
+                          cut(places->y_m, raster_columns, first_column, first_row, columns, rows)};
+  } else {
+    const auto& blocks = std::get<BlockPlacement>(whole);
+    const std::int32_t left = first_column / blocks.side, above = first_row / blocks.side;
+    const std::int32_t across = (first_column + columns - 1) / blocks.side - left + 1;
+    const std::int32_t down = (first_row + rows - 1) / blocks.side - above + 1;
+    part.first_column = left * blocks.side;
+    part.first_row = above * blocks.side;
+    part.columns += first_column - part.first_column;
+    part.rows += first_row - part.first_row;
+    part.placement = BlockPlacement{
+        blocks.side, across, cut(blocks.blocks, blocks.blocks_across, left, above, across, down)};
+  }
+  return part;
+}
+
 }  // namespace scarp

@@ -153,4 +153,18 @@ class GroundGrid {
   Placement placement_;
 };
 
+/// The placement of a rectangle of a raster, or of a little more to the left and above: to whole
+/// blocks. Its samples have the positions that they have in the raster, bit for bit.
+struct PartPlacement {
+  GroundGrid::Placement placement;
+  std::int32_t first_column = 0, first_row = 0;  ///< in the raster
+  std::int32_t columns = 0, rows = 0;
+};
+
+/// @param raster_columns  of the raster that `whole` places
+/// Cost: O(blocks, or samples, of the part).
+PartPlacement part_of(const GroundGrid::Placement& whole, std::int32_t raster_columns,
+                      std::int32_t first_column, std::int32_t first_row, std::int32_t columns,
+                      std::int32_t rows);
+
 }  // namespace scarp
