@@ -97,7 +97,7 @@ class Comparing {
   }
 
   void compare_scene(const std::string& path) {
-    const LoadedScene scene(path);
+    const LoadedScene scene(path, {options_.common.memory_budget_bytes});
     for (const SourceFile& source : scene.scene.description().sources)
       run_.facts["input " + source.name] =
           fmt::format("{} bytes, XXH3-128 {}", source.size, to_hex(source.checksum));

@@ -174,7 +174,7 @@ void print_table(const Flight& flight, const std::vector<Contender>& contenders)
 }  // namespace
 
 int run_fly(const FlyOptions& options) {
-  const LoadedScene scene(options.scene);
+  const LoadedScene scene(options.scene, {options.common.memory_budget_bytes});
   PartFolder folder(options.output, kPageName, existing(options.common));
   const std::vector<Waypoint> path =
       options.path_file.empty()

@@ -53,24 +53,60 @@ Groups read_tile_groups(const Scene& scene, const SceneTile& tile, std::size_t t
 
 namespace {
 
-/// The tiles of the finest level as one surface.
-Tin read_surface(const Scene& scene, Groups& groups) {
-  std::vector<Tin> tins;
-  std::vector<Groups> groups_of_tile;
-  for (const std::size_t i : finest_tiles(scene.description())) {
-    const SceneTile& tile = scene.description().tiles[i];
-    if (scene.find(tile.id, "tin") == nullptr) continue;  // void
-    tins.push_back(read_tin(scene.open(scene.require(tile.id, "tin"))));
-    groups_of_tile.push_back(read_tile_groups(scene, tile, tins.back().triangles.size()));
-  }
-  if (tins.empty())
+/// The tiles of a level that have a mesh.
+std::vector<const SceneTile*> tiles_of(const Scene& scene, std::int32_t level) {
+  std::vector<const SceneTile*> tiles;
+  for (const SceneTile& tile : scene.description().tiles)
+    if (tile_id(tile).level == level && scene.find(tile.id, "tin") != nullptr)
+      tiles.push_back(&tile);
+  std::ranges::sort(tiles, {}, [](const SceneTile* tile) { return tile_id(*tile); });
+  return tiles;
+}
+
+std::uint64_t triangles_of(const std::vector<const SceneTile*>& tiles) {
+  std::uint64_t triangles = 0;
+  for (const SceneTile* tile : tiles)
+    if (tile->contents) triangles += tile->contents->triangles;
+  return triangles;
+}
+
+std::int32_t finest_level(const Scene& scene) {
+  std::int32_t finest = 0;
+  for (const SceneTile& tile : scene.description().tiles)
+    finest = std::max(finest, tile_id(tile).level);
+  return finest;
+}
+
+/// The finest level of no more triangles than asked for; near the root of a narrow scene there may
+/// be no tile, and the level before has all.
+std::int32_t level_within(const Scene& scene, std::uint64_t most_triangles) {
+  std::int32_t level = finest_level(scene);
+  while (level > 0 && triangles_of(tiles_of(scene, level)) > most_triangles &&
+         !tiles_of(scene, level - 1).empty())
+    --level;
+  return level;
+}
+
+/// The tiles of a level as one surface. @param groups  null: not asked for
+Tin read_surface(const Scene& scene, std::int32_t level, const ScenePart& part, Groups* groups) {
+  const std::vector<const SceneTile*> tiles = tiles_of(scene, level);
+  if (tiles.empty())
     throw Error(ErrorCode::kCorrupt,
                 fmt::format("'{}': has no tile with a mesh; build the scene again", scene.path()));
-  if (tins.size() == 1) {
-    groups = std::move(groups_of_tile.front());
-    return std::move(tins.front());
+  check_room(scene.path(), triangles_of(tiles),
+             groups ? kBytesPerGroupedTriangle : kBytesPerGroundTriangle, part.memory_bytes,
+             "raise --memory; scarp cull and scarp viewshed --max-distance read parts of it");
+  std::vector<Tin> tins;
+  std::vector<Groups> groups_of_tile;
+  for (const SceneTile* tile : tiles) {
+    tins.push_back(read_tin(scene.open(scene.require(tile->id, "tin"))));
+    if (groups)
+      groups_of_tile.push_back(read_tile_groups(scene, *tile, tins.back().triangles.size()));
   }
-  groups = join_groups(groups_of_tile);
+  if (groups)
+    *groups = groups_of_tile.size() == 1 ? std::move(groups_of_tile.front())
+                                         : join_groups(groups_of_tile);
+  if (tins.size() == 1) return std::move(tins.front());
   std::vector<const Tin*> parts;
   for (const Tin& tin : tins) parts.push_back(&tin);
   return weld(parts).tin;
@@ -78,9 +114,22 @@ Tin read_surface(const Scene& scene, Groups& groups) {
 
 }  // namespace
 
-LoadedScene::LoadedScene(const std::string& path)
+void check_room(const std::string& scene, std::uint64_t triangles, double bytes_per_triangle,
+                std::uint64_t allowed, const std::string& remedy) {
+  const double needed = bytes_per_triangle * static_cast<double>(triangles);
+  if (allowed == 0 || needed <= static_cast<double>(allowed)) return;
+  throw Error(ErrorCode::kResource,
+              fmt::format("'{}': {} triangles take about {:.2f} GiB at once, and --memory allows "
+                          "{:.2f} GiB; {}",
+                          scene, triangles, needed / 0x1p30, static_cast<double>(allowed) / 0x1p30,
+                          remedy));
+}
+
+LoadedScene::LoadedScene(const std::string& path, const ScenePart& part)
     : scene(open_scene(path)),
-      tin(read_surface(scene, groups)),
+      level(level_within(scene, part.most_triangles)),
+      is_finest(level == finest_level(scene)),
+      tin(read_surface(scene, level, part, is_finest ? &groups : nullptr)),
       frame(frame_of(scene.description())),
       index(tin) {}
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -13,17 +15,37 @@
 
 namespace scarp {
 
+/// How much of a scene is read at once.
+struct ScenePart {
+  std::uint64_t memory_bytes = 0;  ///< what it may take; 0: anything
+  /// Where the finest level has more triangles, a coarser one is read, without groups.
+  std::uint64_t most_triangles = std::numeric_limits<std::uint64_t>::max();
+};
+
 /// A scene in memory, with all that commands ask of it: the tiles of its finest level as one
 /// surface, which takes what the whole mesh takes.
+/// Throws as open_scene; Error{kResource}, before the work, where it takes more than it may.
 struct LoadedScene {
-  explicit LoadedScene(const std::string& path);
+  LoadedScene(const std::string& path, const ScenePart& part);
 
   Scene scene;
-  Groups groups;
+  std::int32_t level;  ///< that is read
+  bool is_finest;
+  Groups groups;  ///< none where it is not the finest
   Tin tin;
   GeoFrame frame;
   TinIndex index;
 };
+
+/// What a triangle takes at most while tiles are made one surface with an index, and with groups
+/// and their regions, bytes.
+inline constexpr double kBytesPerGroundTriangle = 240;
+inline constexpr double kBytesPerGroupedTriangle = 320;
+
+/// Throws Error{kResource} where so many triangles take more than is allowed. @param allowed  0:
+/// anything
+void check_room(const std::string& scene, std::uint64_t triangles, double bytes_per_triangle,
+                std::uint64_t allowed, const std::string& remedy);
 
 /// The groups of a tile. Throws Error{kCorrupt} where they are not of as many triangles.
 Groups read_tile_groups(const Scene& scene, const SceneTile& tile, std::size_t triangles);

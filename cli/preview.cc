@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "cli/build/build_plan.h"
 #include "cli/commands.h"
 #include "cli/loaded_scene.h"
 #include "cli/outputs.h"
@@ -41,7 +42,10 @@ View perspective_view(const PreviewOptions& shape, const PreviewCommandOptions& 
 }  // namespace
 
 int run_preview(const PreviewCommandOptions& options) {
-  const LoadedScene scene(options.scene);
+  // What an observer does not see is known of the finest level only.
+  ScenePart part{options.common.memory_budget_bytes};
+  if (!options.observer) part.most_triangles = kMostPreviewTriangles;
+  const LoadedScene scene(options.scene, part);
   const std::vector<double> heights_m = vertex_heights_m(scene.tin, scene.frame);
   PreviewOptions shape;
   shape.width_px = options.width_px;
@@ -71,6 +75,7 @@ int run_preview(const PreviewCommandOptions& options) {
     const nlohmann::json result = {{"picture", options.output},
                                    {"width_px", picture.width_px},
                                    {"height_px", picture.height_px},
+                                   {"level", scene.level},
                                    {"vertical_exaggeration", exaggeration}};
     fmt::print("{}\n", result.dump(2));
   } else {

@@ -65,7 +65,8 @@ class GridSurface : public SightSurface {
 
 class TinSurface : public SightSurface {
  public:
-  explicit TinSurface(const std::string& path) : scene_(path), placer_(scene_.frame) {}
+  TinSurface(const std::string& path, std::uint64_t memory_bytes)
+      : scene_(path, {memory_bytes}), placer_(scene_.frame) {}
 
   const char* name() const override { return "tin"; }
   const GeoFrame& frame() const override { return scene_.frame; }
@@ -106,7 +107,7 @@ std::unique_ptr<SightSurface> open_surface(const std::vector<std::string>& sourc
                                            const DemOptions& options, const Progress& progress) {
   const std::string* scene = scene_among(sources, options);
   if (!scene) return std::make_unique<GridSurface>(read_ground(sources, options, progress));
-  return std::make_unique<TinSurface>(*scene);
+  return std::make_unique<TinSurface>(*scene, options.memory_budget_bytes);
 }
 
 SurfaceNote note_of(const SightSurface& surface) {

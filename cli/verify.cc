@@ -177,7 +177,7 @@ int run_verify(const VerifyOptions& options) {
     if (!(std::abs(height_m) <= 1e7))
       throw Error(ErrorCode::kUsage,
                   fmt::format("--heights {}: metres above ground were expected", height_m));
-  const LoadedScene scene(options.scene);
+  const LoadedScene scene(options.scene, {options.common.memory_budget_bytes});
   const auto methods = culling_methods(scene.groups, has_horizons(scene.scene));
   ProgressBar bar(!options.common.json);
   const VerifyPlan plan{options.eyes, options.heights_m, options.seed, 1};

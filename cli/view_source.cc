@@ -59,6 +59,16 @@ std::vector<std::size_t> tiles_for(const SceneTiles& scene, const std::optional<
   return tiles_for(scene, {});
 }
 
+Tin read_within(SceneTiles& scene, const std::vector<std::size_t>& tiles,
+                std::uint64_t memory_bytes) {
+  std::uint64_t triangles = 0;
+  for (const std::size_t i : tiles)
+    if (scene.tile(i).contents) triangles += scene.tile(i).contents->triangles;
+  check_room(scene.scene().path(), triangles, kBytesPerGroundTriangle, memory_bytes,
+             "raise --memory, or give --max-distance");
+  return scene.read_ground(tiles);
+}
+
 }  // namespace
 
 ViewSource::ViewSource(const std::vector<std::string>& sources,
@@ -70,7 +80,7 @@ ViewSource::ViewSource(const std::vector<std::string>& sources,
                   fmt::format("'{}': is a scene, whose surface blocks; leave --obstacles out, or "
                               "name the terrain model instead",
                               *scene));
-    scene_ = std::make_unique<const SceneGround>(*scene, reach);
+    scene_ = std::make_unique<const SceneGround>(*scene, reach, options.memory_budget_bytes);
     stand_on_scene();
     return;
   }
@@ -79,8 +89,12 @@ ViewSource::ViewSource(const std::vector<std::string>& sources,
   tops_.emplace(obstacles_ ? *obstacles_ : ground_.grid, ground_.grid);
 }
 
-ViewSource::SceneGround::SceneGround(const std::string& path, const std::optional<ViewReach>& reach)
-    : tiles(path), used(tiles_for(tiles, reach)), tin(tiles.read_ground(used)), index(tin) {}
+ViewSource::SceneGround::SceneGround(const std::string& path, const std::optional<ViewReach>& reach,
+                                     std::uint64_t memory_bytes)
+    : tiles(path),
+      used(tiles_for(tiles, reach)),
+      tin(read_within(tiles, used, memory_bytes)),
+      index(tin) {}
 
 void ViewSource::stand_on_scene() {
   const SceneDescription& description = scene_->tiles.scene().description();

@@ -58,7 +58,9 @@ class ViewSource {
  private:
   /// Tiles of a scene as one surface.
   struct SceneGround {
-    SceneGround(const std::string& path, const std::optional<ViewReach>& reach);
+    /// Throws Error{kResource} where its tiles take more than memory_bytes; 0: anything.
+    SceneGround(const std::string& path, const std::optional<ViewReach>& reach,
+                std::uint64_t memory_bytes);
 
     SceneTiles tiles;
     std::vector<std::size_t> used;

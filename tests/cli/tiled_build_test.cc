@@ -12,6 +12,7 @@
 #include <sstream>
 #include <thread>
 
+#include "cli/loaded_scene.h"
 #include "tests/support/fractal_ground.h"
 #include "tests/support/run_scarp.h"
 #include "tests/support/temp_folder.h"
@@ -65,6 +66,28 @@ std::map<std::string, std::string> files_of(const std::string& scene) {
       files[name] = to_hex(digest_of_file(entry.path().string()).checksum);
   }
   return files;
+}
+
+/// Values of a raster by the map place of its samples.
+std::map<std::pair<long, long>, int> values_by_place(const std::string& path) {
+  GDALDataset* raster = GDALDataset::Open(path.c_str());
+  const int columns = raster->GetRasterXSize(), rows = raster->GetRasterYSize();
+  double transform[6];
+  raster->GetGeoTransform(transform);
+  std::vector<std::uint8_t> values(static_cast<std::size_t>(columns) *
+                                   static_cast<std::size_t>(rows));
+  EXPECT_EQ(raster->GetRasterBand(1)->RasterIO(GF_Read, 0, 0, columns, rows, values.data(), columns,
+                                               rows, GDT_Byte, 0, 0),
+            CE_None);
+  GDALClose(raster);
+  std::map<std::pair<long, long>, int> by_place;
+  for (int r = 0; r < rows; ++r)
+    for (int c = 0; c < columns; ++c)
+      by_place[{std::lround(transform[0] + (c + 0.5) * transform[1]),
+                std::lround(transform[3] + (r + 0.5) * transform[5])}] =
+          values[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns) +
+                 static_cast<std::size_t>(c)];
+  return by_place;
 }
 
 constexpr char kQuick[] =
@@ -163,12 +186,41 @@ TEST_F(TiledBuild, GroupsLayerIsTheGroupsOfTheScene) {
   EXPECT_LT(samples_of.rbegin()->first, report["groups"]["groups"].get<std::int32_t>());
 }
 
-TEST_F(TiledBuild, SameBitsForAnyThreadCountAndMemory) {
+/// Makes the C library leave out what this machine's processor has beyond the oldest one. Scarp's
+/// own kernels by instruction set are compared where they are tested.
+constexpr char kOldProcessor[] =
+    "GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX512F,-AVX2,-AVX,-FMA,-FMA4,-SSE4_1 ";
+
+TEST_F(TiledBuild, SameBitsForAnyThreadCountMemoryAndProcessor) {
   const std::string other = folder_->path("other.scene");
-  for (const char* how : {"--threads 1 --memory 250M", "--threads 5 --memory 3GiB"}) {
-    ASSERT_EQ(run_scarp(build(other) + how + " --overwrite").exit_code, 0) << how;
-    EXPECT_EQ(files_of(other), files_of(scene_)) << how;
+  for (const auto& [before, after] : {std::pair{"", "--threads 1 --memory 250M"},
+                                      std::pair{kOldProcessor, "--threads 5 --memory 3GiB"}}) {
+    ASSERT_EQ(run_scarp(before + build(other) + after + " --overwrite").exit_code, 0) << after;
+    EXPECT_EQ(files_of(other), files_of(scene_)) << before << after;
   }
+}
+
+TEST_F(TiledBuild, ViewshedsOfTheGridDependOnTheGridOnly) {
+  const auto seen_by = [&](const std::string& before, const std::string& dem,
+                           const std::string& options) {
+    const std::string file = folder_->path("grid.tif");
+    const RunResult run =
+        run_scarp(before + "$SCARP viewshed " + dem +
+                  " --observer=401900,5198200,40 --overwrite -o " + file + options);
+    EXPECT_EQ(run.exit_code, 0) << run.errors;
+    return values_by_place(file);
+  };
+  const auto first = seen_by("", dem_, "");
+  EXPECT_GT(std::ranges::count_if(first, [](const auto& at) { return at.second == 1; }), 500);
+  EXPECT_EQ(seen_by("", dem_, " --threads 1"), first);
+  EXPECT_EQ(seen_by("", dem_, " --threads 7 --memory 300K"), first);
+  EXPECT_EQ(seen_by(kOldProcessor, dem_, ""), first);
+  const std::string tiled = folder_->path("tiled.tif");
+  ASSERT_EQ(run_scarp("gdal_translate -q -co TILED=YES -co BLOCKXSIZE=32 -co BLOCKYSIZE=32 " +
+                      dem_ + " " + tiled)
+                .exit_code,
+            0);
+  EXPECT_EQ(seen_by("", tiled, ""), first);
 }
 
 TEST_F(TiledBuild, CullReadsTheTilesThatItNeeds) {
@@ -186,28 +238,6 @@ TEST_F(TiledBuild, CullReadsTheTilesThatItNeeds) {
     EXPECT_LT((*part)["visible_groups"].size(), groups.size());
     for (const int group : (*part)["visible_groups"]) EXPECT_TRUE(groups.contains(group));
   }
-}
-
-/// Values of a raster by the map place of its samples.
-std::map<std::pair<long, long>, int> values_by_place(const std::string& path) {
-  GDALDataset* raster = GDALDataset::Open(path.c_str());
-  const int columns = raster->GetRasterXSize(), rows = raster->GetRasterYSize();
-  double transform[6];
-  raster->GetGeoTransform(transform);
-  std::vector<std::uint8_t> values(static_cast<std::size_t>(columns) *
-                                   static_cast<std::size_t>(rows));
-  EXPECT_EQ(raster->GetRasterBand(1)->RasterIO(GF_Read, 0, 0, columns, rows, values.data(), columns,
-                                               rows, GDT_Byte, 0, 0),
-            CE_None);
-  GDALClose(raster);
-  std::map<std::pair<long, long>, int> by_place;
-  for (int r = 0; r < rows; ++r)
-    for (int c = 0; c < columns; ++c)
-      by_place[{std::lround(transform[0] + (c + 0.5) * transform[1]),
-                std::lround(transform[3] + (r + 0.5) * transform[5])}] =
-          values[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns) +
-                 static_cast<std::size_t>(c)];
-  return by_place;
 }
 
 TEST_F(TiledBuild, ViewshedReadsTheTilesThatItReaches) {
@@ -391,6 +421,37 @@ TEST_F(TiledBuild, TwoBuildsOfOneSceneAreOneTooMany) {
   EXPECT_EQ(second.exit_code, 1);
   EXPECT_NE(second.errors.find("another process is building"), std::string::npos) << second.errors;
   EXPECT_EQ(std::count(second.errors.begin(), second.errors.end(), '\n'), 1);
+}
+
+TEST_F(TiledBuild, CommandsThatTakeAllOfAScenePayHeedToMemory) {
+  const std::string ground = " --from=401900,5198200 --to=402900,5198200";
+  for (const std::string& command :
+       {"verify " + scene_, "compare " + scene_ + " -o " + folder_->path("never"),
+        "fly " + scene_ + " -o " + folder_->path("never"), "sight " + scene_ + ground,
+        "viewshed " + scene_ + " --observer=401900,5198200 -o " + folder_->path("never.tif"),
+        "preview " + scene_ + " --observer=401900,5198200 -o " + folder_->path("never.png")}) {
+    const RunResult run = run_scarp("$SCARP " + command + " --memory 100K");
+    EXPECT_EQ(run.exit_code, 1) << command;
+    EXPECT_NE(run.errors.find("and --memory allows 0.00 GiB; raise --memory"), std::string::npos)
+        << command << "\n"
+        << run.errors;
+    EXPECT_EQ(std::count(run.errors.begin(), run.errors.end(), '\n'), 1) << run.errors;
+  }
+  EXPECT_FALSE(fs::exists(folder_->path("never")));
+}
+
+TEST_F(TiledBuild, PicturesOfLargeScenesAreOfACoarserLevel) {
+  const LoadedScene whole(scene_, {});
+  EXPECT_EQ(whole.level, 2);
+  EXPECT_TRUE(whole.is_finest);
+  EXPECT_EQ(whole.groups.group_of_triangle.size(), whole.tin.triangles.size());
+  ScenePart part;
+  part.most_triangles = whole.tin.triangles.size() - 1;
+  const LoadedScene coarser(scene_, part);
+  EXPECT_EQ(coarser.level, 1);
+  EXPECT_FALSE(coarser.is_finest);
+  EXPECT_LT(coarser.tin.triangles.size(), whole.tin.triangles.size());
+  EXPECT_TRUE(coarser.groups.group_of_triangle.empty());
 }
 
 TEST_F(TiledBuild, CheckFindsAFlippedBitInAnyFile) {
