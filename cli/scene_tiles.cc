@@ -32,6 +32,30 @@ bool is_beside(const TileContents& contents, const Position& eye, const ViewRang
          is_right_of(contents, eye, (view.from_rad + view.to_rad) / 2 - M_PI / 2);
 }
 
+/// The triangles of a surface that may come nearer to a place than a distance, in their order.
+Tin part_near(const Tin& tin, const Position& place, double distance_m) {
+  Tin part;
+  std::vector<VertexIndex> new_vertex(tin.vertices.size(), kNone);
+  for (auto triangle : tin.triangles) {
+    const Position corners[] = {tin.vertices[triangle[0]], tin.vertices[triangle[1]],
+                                tin.vertices[triangle[2]]};
+    const Bounds bounds = bounds_of(corners);
+    if (bounds.low.x_m > place.x_m + distance_m || bounds.high.x_m < place.x_m - distance_m ||
+        bounds.low.y_m > place.y_m + distance_m || bounds.high.y_m < place.y_m - distance_m)
+      continue;
+    for (VertexIndex& v : triangle) {
+      if (new_vertex[v] == kNone) {
+        new_vertex[v] = static_cast<VertexIndex>(part.vertices.size());
+        part.vertices.push_back(tin.vertices[v]);
+      }
+      v = new_vertex[v];
+    }
+    part.triangles.push_back(triangle);
+  }
+  connect_neighbours(part);
+  return part;
+}
+
 }  // namespace
 
 bool may_meet(const TileContents& contents, const ViewPlan& plan) {
@@ -133,7 +157,8 @@ MapPoint SceneTiles::resolve(const TypedPosition& typed, const std::string& crs)
   point.height_m = 0;
   // The place in the plane depends a little on the height: see ground_height_m.
   constexpr double kLeanM = 100;
-  const Tin ground = read_ground(tiles_in({placer.place(point), kLeanM, {}}));
+  const Position place = placer.place(point);
+  const Tin ground = part_near(read_ground(tiles_in({place, kLeanM, {}})), place, kLeanM);
   return scarp::resolve(typed, crs, frame_, TinIndex(ground));
 }
 

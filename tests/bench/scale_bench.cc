@@ -16,6 +16,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <stdexcept>
@@ -136,11 +137,18 @@ Options parse(int argc, char** argv) {
   return options;
 }
 
-std::uint64_t bytes_of_folder(const std::string& path) {
-  std::uint64_t bytes = 0;
+/// Bytes of a scene's files by their endings: tin, groups, range, tif, png, json.
+std::map<std::string, std::uint64_t> bytes_by_kind(const std::string& path) {
+  std::map<std::string, std::uint64_t> bytes;
   for (const auto& entry : fs::recursive_directory_iterator(path))
-    if (entry.is_regular_file()) bytes += entry.file_size();
+    if (entry.is_regular_file()) bytes[entry.path().extension().string()] += entry.file_size();
   return bytes;
+}
+
+double sum_of(const std::map<std::string, std::uint64_t>& bytes) {
+  double sum = 0;
+  for (const auto& [kind, count] : bytes) sum += static_cast<double>(count);
+  return sum;
 }
 
 /// One size: a row of the table.
@@ -163,18 +171,23 @@ void measure(const Options& options, const std::string& dem, const std::string& 
   const Ran cull =
       run_program({"cull", scene, "--camera=" + camera, "--max-distance", "10000", "--json"}, out);
   const json answer = json::parse(cull.output);
+  const std::map<std::string, std::uint64_t> bytes = bytes_by_kind(scene);
   fmt::print("{:8.1f} {:9} {:9.1f} {:9.2f} {:9.2f} {:9.0f} {:9.2f} {:9.1f} {:5}/{:<5} {:8.1f}\n",
              samples / 1e6, report["mesh"]["triangles"].get<std::uint64_t>(), build.wall_s,
              1e6 * build.wall_s / samples, 1e6 * build.cpu_s / samples, build.peak_mib,
-             static_cast<double>(bytes_of_folder(scene)) / samples,
-             1e3 * answer["open_s"].get<double>(), answer["tiles_read"].get<int>(),
-             answer["tiles"].get<int>(), 1e3 * answer["answer_s"].get<double>());
+             sum_of(bytes) / samples, 1e3 * answer["open_s"].get<double>(),
+             answer["tiles_read"].get<int>(), answer["tiles"].get<int>(),
+             1e3 * answer["answer_s"].get<double>());
   rows.push_back({{"samples", samples},
                   {"seconds", build.wall_s},
                   {"cpu_seconds", build.cpu_s},
                   {"peak_mib", build.peak_mib},
-                  {"bytes_a_sample", static_cast<double>(bytes_of_folder(scene)) / samples}});
+                  {"bytes_a_sample", sum_of(bytes) / samples}});
   if (!options.json_file.empty()) std::ofstream(options.json_file) << rows.dump(1) << '\n';
+  fmt::print("  bytes a sample:");
+  for (const auto& [kind, count] : bytes)
+    fmt::print(" {} {:.3f}", kind, static_cast<double>(count) / samples);
+  fmt::print("\n");
   for (const json& stage : report["stages"])
     fmt::print("  {:<10} {:9.1f} s {:7.0f} MiB\n", stage["name"].get<std::string>(),
                stage["seconds"].get<double>(), stage["peak_memory_bytes"].get<double>() / 0x1p20);
