@@ -4,17 +4,11 @@
 #include <cassert>
 #include <cmath>
 
-#include "core/raster/fill_span.h"
+#include "core/raster/raster_kernels.h"
 #include "core/threads/parallel_for.h"
 
 namespace scarp {
 namespace {
-
-constexpr std::int64_t kHalf = kSubpixels / 2;
-
-/// No corner is farther than this from the picture: with 8 bits of subpixels, coordinates stay
-/// under 2^29, their differences under 2^30 and products of two differences under 2^60.
-constexpr double kGuardPx = 1 << 20;
 
 /// Tiles are written by one thread at a time; one tile's depth and objects fit a level-2 cache.
 constexpr int kTileWidthPx = 128;
@@ -24,99 +18,17 @@ constexpr int kTileHeightPx = 64;
 constexpr std::size_t kChunkTriangles = 4096;
 constexpr std::size_t kBatchChunks = 64;
 
-/// On which side of the planes of the view a corner lies: a triangle all outside one is not seen.
-enum Outside : std::uint32_t {
-  kLeft = 1,
-  kRight = 2,
-  kBelow = 4,
-  kAbove = 8,
-  kTooNear = 16,
-  kTooFar = 32,
-  kBeyondGuard = 64,  // of any side; such triangles are cut
-};
-
-/// A corner on the screen, in subpixels from the upper left.
-struct ScreenVertex {
-  std::int32_t x = 0;
-  std::int32_t y = 0;
-  double depth = 0;
-  std::uint32_t outside = 0;
-};
-
-/// A triangle ready to be drawn: corners from top to bottom, depth as a plane from the first.
-struct ScreenTriangle {
-  std::array<std::int32_t, 3> x;
-  std::array<std::int32_t, 3> y;
-  double depth;
-  double depth_per_x;  // per subpixel
-  double depth_per_y;
-  std::uint32_t object;
-  bool middle_is_right;
+/// Tiles that a triangle's box touches, all ends included.
+struct TileRange {
+  std::uint16_t first_column, last_column, first_row, last_row;
 };
 
 /// The prepared triangles of a chunk, and which of them touch which tile, in index order.
 struct Chunk {
   std::vector<ScreenTriangle> triangles;
+  std::vector<TileRange> ranges;       // [triangles]
   std::vector<std::uint32_t> first;    // [tiles + 1] into entries
   std::vector<std::uint32_t> entries;  // into triangles
-};
-
-std::int64_t floor_divide(std::int64_t a, std::int64_t b) {
-  const std::int64_t quotient = a / b;
-  return quotient - (a % b < 0 ? 1 : 0);
-}
-
-/// First row or column whose pixel centre is at or after the coordinate.
-int first_centre(std::int64_t subpixels) {
-  return static_cast<int>((subpixels - kHalf + kSubpixels - 1) >> 8);
-}
-static_assert(kSubpixels == 1 << 8);
-
-/// How clip space lands on the target's pixels.
-class Screen {
- public:
-  Screen(int width_px, int height_px)
-      : half_width_px_(width_px / 2.0),
-        half_height_px_(height_px / 2.0),
-        guard_x_(kGuardPx / half_width_px_),
-        guard_y_(kGuardPx / half_height_px_) {}
-
-  double guard_x() const { return guard_x_; }
-  double guard_y() const { return guard_y_; }
-
-  std::uint32_t outside(const ClipPosition& p) const {
-    std::uint32_t bits = 0;
-    if (p.x < -p.w) bits |= kLeft;
-    if (p.x > p.w) bits |= kRight;
-    if (p.y < -p.w) bits |= kBelow;
-    if (p.y > p.w) bits |= kAbove;
-    if (p.z > p.w) bits |= kTooNear;
-    if (p.z < 0) bits |= kTooFar;
-    if (std::abs(p.x) > guard_x_ * p.w || std::abs(p.y) > guard_y_ * p.w) bits |= kBeyondGuard;
-    return bits;
-  }
-
-  /// Requires a point that is neither too near nor beyond the guard, up to rounding.
-  ScreenVertex place(const ClipPosition& p) const {
-    const double x_px = (p.x / p.w + 1) * half_width_px_;
-    const double y_px = (1 - p.y / p.w) * half_height_px_;
-    return {static_cast<std::int32_t>(std::nearbyint(x_px * kSubpixels)),
-            static_cast<std::int32_t>(std::nearbyint(y_px * kSubpixels)), p.z / p.w, 0};
-  }
-
-  ScreenVertex place_if_whole(const ClipPosition& p) const {
-    const std::uint32_t bits = outside(p);
-    ScreenVertex vertex;
-    if ((bits & (kTooNear | kBeyondGuard)) == 0) vertex = place(p);
-    vertex.outside = bits;
-    return vertex;
-  }
-
- private:
-  double half_width_px_;
-  double half_height_px_;
-  double guard_x_;
-  double guard_y_;
 };
 
 /// A convex polygon in clip space: a triangle gains at most one corner a plane.
@@ -147,9 +59,9 @@ Polygon cut(const Polygon& polygon, const Distance& distance) {
   return kept;
 }
 
-Polygon cut_to_guard(const Screen& screen, Polygon polygon) {
-  const double x = screen.guard_x();
-  const double y = screen.guard_y();
+Polygon cut_to_guard(const ScreenMap& map, Polygon polygon) {
+  const double x = map.guard_x;
+  const double y = map.guard_y;
   polygon = cut(polygon, [](const ClipPosition& p) { return p.w - p.z; });
   polygon = cut(polygon, [x](const ClipPosition& p) { return x * p.w + p.x; });
   polygon = cut(polygon, [x](const ClipPosition& p) { return x * p.w - p.x; });
@@ -173,168 +85,68 @@ struct Tiling {
   std::size_t count() const { return static_cast<std::size_t>(columns * rows); }
 
   template <typename Visit>
-  void for_each_tile(const ScreenTriangle& triangle, const Visit& visit) const {
-    const auto [left, right] = std::minmax({triangle.x[0], triangle.x[1], triangle.x[2]});
-    const int first_column = std::max(0, first_centre(left)) / kTileWidthPx;
-    const int last_column = std::min(width_px, first_centre(right)) - 1;
-    const int first_row = std::max(0, first_centre(triangle.y[0])) / kTileHeightPx;
-    const int last_row = std::min(height_px, first_centre(triangle.y[2])) - 1;
-    for (int row = first_row; row <= last_row / kTileHeightPx; ++row) {
-      for (int column = first_column; column <= last_column / kTileWidthPx; ++column) {
+  void for_each_tile(const TileRange& range, const Visit& visit) const {
+    for (int row = range.first_row; row <= range.last_row; ++row)
+      for (int column = range.first_column; column <= range.last_column; ++column)
         visit(static_cast<std::size_t>(row * columns + column));
-      }
-    }
   }
 };
 
 /// Adds the triangle unless it holds no pixel centre of the target for certain.
-void prepare(const Tiling& tiling, const ScreenVertex& a, const ScreenVertex& b,
-             const ScreenVertex& c, std::uint32_t object, std::vector<ScreenTriangle>& out) {
-  const auto [left, right] = std::minmax({a.x, b.x, c.x});
-  if (std::max(0, first_centre(left)) >= std::min(tiling.width_px, first_centre(right))) return;
-  const ScreenVertex* v[3] = {&a, &b, &c};
-  if (v[1]->y < v[0]->y) std::swap(v[0], v[1]);
-  if (v[2]->y < v[1]->y) std::swap(v[1], v[2]);
-  if (v[1]->y < v[0]->y) std::swap(v[0], v[1]);
-  if (std::max(0, first_centre(v[0]->y)) >= std::min(tiling.height_px, first_centre(v[2]->y))) {
-    return;
-  }
-  const std::int64_t x1 = v[1]->x - v[0]->x;
-  const std::int64_t y1 = v[1]->y - v[0]->y;
-  const std::int64_t x2 = v[2]->x - v[0]->x;
-  const std::int64_t y2 = v[2]->y - v[0]->y;
-  const std::int64_t twice_area = x1 * y2 - x2 * y1;
+inline void prepare(const Tiling& tiling, const ScreenCorner& a, ScreenCorner b, ScreenCorner c,
+                    std::uint32_t object, Chunk& out) {
+  const int left = std::max(0, first_centre(std::min({a.x, b.x, c.x})));
+  const int right = std::min(tiling.width_px, first_centre(std::max({a.x, b.x, c.x}))) - 1;
+  const int top = std::max(0, first_centre(std::min({a.y, b.y, c.y})));
+  const int bottom = std::min(tiling.height_px, first_centre(std::max({a.y, b.y, c.y}))) - 1;
+  if ((left > right) | (top > bottom)) return;
+  std::int64_t x1 = b.x - a.x, y1 = b.y - a.y;
+  std::int64_t x2 = c.x - a.x, y2 = c.y - a.y;
+  std::int64_t twice_area = x1 * y2 - x2 * y1;
   if (twice_area == 0) return;
-  const double depth1 = v[1]->depth - v[0]->depth;
-  const double depth2 = v[2]->depth - v[0]->depth;
+  if (twice_area < 0) {
+    std::swap(b, c);
+    std::swap(x1, x2);
+    std::swap(y1, y2);
+    twice_area = -twice_area;
+  }
+  const double depth1 = b.depth - a.depth;
+  const double depth2 = c.depth - a.depth;
   const double scale = 1 / static_cast<double>(twice_area);
-  out.push_back({{v[0]->x, v[1]->x, v[2]->x},
-                 {v[0]->y, v[1]->y, v[2]->y},
-                 v[0]->depth,
-                 (depth1 * static_cast<double>(y2) - depth2 * static_cast<double>(y1)) * scale,
-                 (depth2 * static_cast<double>(x1) - depth1 * static_cast<double>(x2)) * scale,
-                 object,
-                 twice_area > 0});
+  out.triangles.push_back(
+      {{a.x, b.x, c.x},
+       {a.y, b.y, c.y},
+       a.depth,
+       (depth1 * static_cast<double>(y2) - depth2 * static_cast<double>(y1)) * scale,
+       (depth2 * static_cast<double>(x1) - depth1 * static_cast<double>(x2)) * scale,
+       object});
+  out.ranges.push_back({static_cast<std::uint16_t>(left / kTileWidthPx),
+                        static_cast<std::uint16_t>(right / kTileWidthPx),
+                        static_cast<std::uint16_t>(top / kTileHeightPx),
+                        static_cast<std::uint16_t>(bottom / kTileHeightPx)});
 }
 
-void prepare_cut(const Screen& screen, const Tiling& tiling, const Polygon& triangle,
-                 std::uint32_t object, std::vector<ScreenTriangle>& out) {
-  const Polygon polygon = cut_to_guard(screen, triangle);
+void prepare_cut(const ScreenMap& map, const Tiling& tiling, const Polygon& triangle,
+                 std::uint32_t object, Chunk& out) {
+  const Polygon polygon = cut_to_guard(map, triangle);
   if (polygon.count < 3) return;
-  const ScreenVertex first = screen.place(polygon.corners[0]);
-  ScreenVertex before = screen.place(polygon.corners[1]);
-  for (std::size_t i = 2; i < polygon.count; ++i) {
-    const ScreenVertex corner = screen.place(polygon.corners[i]);
-    prepare(tiling, first, before, corner, object, out);
-    before = corner;
-  }
+  const auto corner = [&](std::size_t i) { return place_corner(map, polygon.corners[i]); };
+  for (std::size_t i = 2; i < polygon.count; ++i)
+    prepare(tiling, corner(0), corner(i - 1), corner(i), object, out);
 }
 
 /// Counts, then fills: the triangles of each tile, in order.
 void bin(const Tiling& tiling, Chunk& chunk) {
   chunk.first.assign(tiling.count() + 1, 0);
-  for (const ScreenTriangle& triangle : chunk.triangles) {
-    tiling.for_each_tile(triangle, [&](std::size_t tile) { ++chunk.first[tile + 1]; });
-  }
-  for (std::size_t tile = 0; tile < tiling.count(); ++tile) {
+  for (const TileRange& range : chunk.ranges)
+    tiling.for_each_tile(range, [&](std::size_t tile) { ++chunk.first[tile + 1]; });
+  for (std::size_t tile = 0; tile < tiling.count(); ++tile)
     chunk.first[tile + 1] += chunk.first[tile];
-  }
   chunk.entries.resize(chunk.first.back());
   std::vector<std::uint32_t> next(chunk.first.begin(), chunk.first.end() - 1);
-  for (std::uint32_t t = 0; t < chunk.triangles.size(); ++t) {
-    tiling.for_each_tile(chunk.triangles[t],
+  for (std::uint32_t t = 0; t < chunk.ranges.size(); ++t)
+    tiling.for_each_tile(chunk.ranges[t],
                          [&](std::size_t tile) { chunk.entries[next[tile]++] = t; });
-  }
-}
-
-/// Walks down an edge and knows, in each row, the first column whose centre is at or right of it:
-/// the exact ceiling of a fraction, kept as quotient and shortfall. Every triangle on either side
-/// of the edge asks for the same number, which is what makes shared edges meet.
-class EdgeWalk {
- public:
-  /// Requires y_bottom > y_top, and the row's centre between them.
-  EdgeWalk(std::int64_t x_top, std::int64_t y_top, std::int64_t x_bottom, std::int64_t y_bottom,
-           int row) {
-    const std::int64_t dx = x_bottom - x_top;
-    const std::int64_t dy = y_bottom - y_top;
-    const std::int64_t y = static_cast<std::int64_t>(row) * kSubpixels + kHalf;
-    divisor_ = dy * kSubpixels;
-    const std::int64_t numerator = (x_top - kHalf) * dy + (y - y_top) * dx;
-    column_ = -floor_divide(-numerator, divisor_);
-    shortfall_ = column_ * divisor_ - numerator;
-    // A row further down adds kSubpixels * dx / divisor_ = dx / dy columns.
-    column_step_ = floor_divide(dx, dy);
-    remainder_step_ = (dx - column_step_ * dy) * kSubpixels;
-  }
-
-  std::int64_t column() const { return column_; }
-
-  void step() {
-    column_ += column_step_;
-    shortfall_ -= remainder_step_;
-    if (shortfall_ < 0) {
-      ++column_;
-      shortfall_ += divisor_;
-    }
-  }
-
- private:
-  std::int64_t column_;     // ceiling of numerator / divisor
-  std::int64_t shortfall_;  // column * divisor - numerator, in [0, divisor)
-  std::int64_t divisor_;
-  std::int64_t column_step_;
-  std::int64_t remainder_step_;
-};
-
-/// A rectangle of the target, [left, right) x [top, bottom), in pixels.
-struct Tile {
-  int left;
-  int top;
-  int right;
-  int bottom;
-};
-
-/// Fills the rows [row, end) between two edges.
-void fill_rows(Target& target, const Tile& tile, const ScreenTriangle& triangle, EdgeWalk& left,
-               EdgeWalk& right, int row, int end) {
-  for (; row < end; ++row, left.step(), right.step()) {
-    const int begin_x = static_cast<int>(std::max<std::int64_t>(left.column(), tile.left));
-    const int end_x = static_cast<int>(std::min<std::int64_t>(right.column(), tile.right));
-    if (begin_x >= end_x) continue;
-    // The span starts from double, at a pixel inside the triangle: float then only carries what
-    // changes within the span, and never leaves the depths of the corners by more than rounding.
-    const double dx = static_cast<double>(begin_x) * kSubpixels + kHalf - triangle.x[0];
-    const double dy = static_cast<double>(row) * kSubpixels + kHalf - triangle.y[0];
-    const Span span = {
-        static_cast<float>(triangle.depth + triangle.depth_per_x * dx + triangle.depth_per_y * dy),
-        static_cast<float>(triangle.depth_per_x * kSubpixels), triangle.object};
-    const std::size_t at = target.index(begin_x, row);
-    const std::size_t count = static_cast<std::size_t>(end_x - begin_x);
-    if (target.object.empty()) {
-      fill_span_depth(span, count, target.depth.data() + at);
-    } else {
-      fill_span(span, count, target.depth.data() + at, target.object.data() + at);
-    }
-  }
-}
-
-void fill_triangle(Target& target, const Tile& tile, const ScreenTriangle& t) {
-  const int top = std::max(tile.top, first_centre(t.y[0]));
-  const int bottom = std::min(tile.bottom, first_centre(t.y[2]));
-  if (top >= bottom) return;
-  const int middle = std::clamp(first_centre(t.y[1]), top, bottom);
-  EdgeWalk longest(t.x[0], t.y[0], t.x[2], t.y[2], top);
-  const auto fill = [&](std::size_t from, std::size_t to, int begin, int end) {
-    if (begin >= end) return;
-    EdgeWalk shorter(t.x[from], t.y[from], t.x[to], t.y[to], begin);
-    if (t.middle_is_right) {
-      fill_rows(target, tile, t, longest, shorter, begin, end);
-    } else {
-      fill_rows(target, tile, t, shorter, longest, begin, end);
-    }
-  };
-  fill(0, 1, top, middle);
-  fill(1, 2, middle, bottom);
 }
 
 /// One call of rasterise: what its steps share.
@@ -343,19 +155,18 @@ struct Drawing {
   std::span<const ClipPosition> vertices;
   std::span<const std::array<VertexIndex, 3>> triangles;
   std::span<const std::uint32_t> objects;
-  Screen screen;
+  ScreenMap map;
   Tiling tiling;
-  std::vector<ScreenVertex> placed = {};  // [vertices]
+  ScreenCorners placed = {};  // [vertices]
 };
 
 void place_vertices(Drawing& drawing) {
   const std::size_t count = drawing.vertices.size();
   drawing.placed.resize(count);
   parallel_for((count + kChunkTriangles - 1) / kChunkTriangles, [&](std::size_t chunk) {
-    const std::size_t end = std::min(count, (chunk + 1) * kChunkTriangles);
-    for (std::size_t i = chunk * kChunkTriangles; i < end; ++i) {
-      drawing.placed[i] = drawing.screen.place_if_whole(drawing.vertices[i]);
-    }
+    const std::size_t begin = chunk * kChunkTriangles;
+    place_corners(drawing.map, drawing.vertices, begin, std::min(count, begin + kChunkTriangles),
+                  drawing.placed);
   });
 }
 
@@ -363,22 +174,26 @@ void place_vertices(Drawing& drawing) {
 void prepare_chunk(const Drawing& drawing, std::size_t begin, std::size_t end, Chunk& chunk) {
   constexpr std::uint32_t kHidesAll = kLeft | kRight | kBelow | kAbove | kTooNear | kTooFar;
   constexpr std::uint32_t kCuts = kTooNear | kBeyondGuard;
+  const ScreenCorners& placed = drawing.placed;
   chunk.triangles.clear();
+  chunk.ranges.clear();
   for (std::size_t i = begin; i < end; ++i) {
     const auto& [a, b, c] = drawing.triangles[i];
     assert(std::max({a, b, c}) < drawing.vertices.size());
-    const ScreenVertex& at_a = drawing.placed[a];
-    const ScreenVertex& at_b = drawing.placed[b];
-    const ScreenVertex& at_c = drawing.placed[c];
-    if ((at_a.outside & at_b.outside & at_c.outside & kHidesAll) != 0) continue;
+    const std::uint32_t at_a = placed.outside[a], at_b = placed.outside[b],
+                        at_c = placed.outside[c];
+    if ((at_a & at_b & at_c & kHidesAll) != 0) continue;
     const std::uint32_t object =
         drawing.objects.empty() ? static_cast<std::uint32_t>(i) : drawing.objects[i];
     assert(object != kNone);
-    if (((at_a.outside | at_b.outside | at_c.outside) & kCuts) == 0) {
-      prepare(drawing.tiling, at_a, at_b, at_c, object, chunk.triangles);
+    if (((at_a | at_b | at_c) & kCuts) == 0) {
+      const auto corner = [&](VertexIndex v) {
+        return ScreenCorner{placed.x[v], placed.y[v], placed.depth[v]};
+      };
+      prepare(drawing.tiling, corner(a), corner(b), corner(c), object, chunk);
     } else {
       const Polygon whole = {{drawing.vertices[a], drawing.vertices[b], drawing.vertices[c]}, 3};
-      prepare_cut(drawing.screen, drawing.tiling, whole, object, chunk.triangles);
+      prepare_cut(drawing.map, drawing.tiling, whole, object, chunk);
     }
   }
   bin(drawing.tiling, chunk);
@@ -386,15 +201,20 @@ void prepare_chunk(const Drawing& drawing, std::size_t begin, std::size_t end, C
 
 void draw_tile(const Drawing& drawing, std::span<const Chunk> chunks, std::size_t index) {
   const Tiling& tiling = drawing.tiling;
+  Target& target = drawing.target;
   const int left = static_cast<int>(index) % tiling.columns * kTileWidthPx;
   const int top = static_cast<int>(index) / tiling.columns * kTileHeightPx;
-  const Tile tile = {left, top, std::min(left + kTileWidthPx, tiling.width_px),
-                     std::min(top + kTileHeightPx, tiling.height_px)};
-  for (const Chunk& chunk : chunks) {
-    for (std::uint32_t i = chunk.first[index]; i < chunk.first[index + 1]; ++i) {
-      fill_triangle(drawing.target, tile, chunk.triangles[chunk.entries[i]]);
-    }
-  }
+  const PixelTile tile = {left,
+                          top,
+                          std::min(left + kTileWidthPx, tiling.width_px),
+                          std::min(top + kTileHeightPx, tiling.height_px),
+                          static_cast<std::size_t>(target.width_px),
+                          target.depth.data(),
+                          target.object.empty() ? nullptr : target.object.data()};
+  for (const Chunk& chunk : chunks)
+    fill_triangles(tile, chunk.triangles.data(),
+                   std::span(chunk.entries)
+                       .subspan(chunk.first[index], chunk.first[index + 1] - chunk.first[index]));
 }
 
 Target target_of(int width_px, int height_px) {
@@ -425,7 +245,7 @@ void rasterise(Target& target, std::span<const ClipPosition> vertices,
   assert(objects.empty() || objects.size() == triangles.size());
   assert(target.object.empty() || target.object.size() == target.depth.size());
   Drawing drawing = {
-      target,        vertices, triangles, objects, Screen(target.width_px, target.height_px),
+      target,        vertices, triangles, objects, ScreenMap(target.width_px, target.height_px),
       Tiling(target)};
   place_vertices(drawing);
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/raster/camera.h"
+#include "core/raster/screen_triangle.h"
 
 namespace scarp {
 
@@ -29,9 +30,6 @@ Target empty_target(int width_px, int height_px);
 Target empty_depth_target(int width_px, int height_px);
 
 inline constexpr int kGreatestSizePx = 1 << 16;
-
-/// Corners of triangles are rounded to this part of a pixel, once; coverage is exact from there.
-inline constexpr int kSubpixels = 256;
 
 /// Draws triangles over what the target already holds.
 ///
