@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "cli/commands.h"
 #include "cli/fly/flight.h"
@@ -175,6 +176,7 @@ nlohmann::json json_of(const Flight& flight, const std::vector<Contender>& conte
                        {"find_ms", sum.find_ms},
                        {"draw_ms", sum.draw_ms},
                        {"wrong_px", sum.wrong_px},
+                       {"judged_wrong_px", sum.judged_wrong_px},
                        {"missed_groups", sum.missed_groups},
                        {"bytes", contenders[c].bytes}});
   }
@@ -182,20 +184,23 @@ nlohmann::json json_of(const Flight& flight, const std::vector<Contender>& conte
 }
 
 void print_table(const Flight& flight, const std::vector<Contender>& contenders) {
-  fmt::print("{:<10} {:>10} {:>9} {:>16} {:>9} {:>9} {:>13} {:>13}\n", "method", "drawn", "of view",
-             "of visible groups", "find, ms", "draw, ms", "wrong pixels", "groups missed");
+  fmt::print("{:<13} {:>9} {:>8} {:>17} {:>9} {:>9} {:>12} {:>7} {:>13}\n", "method", "drawn",
+             "of view", "of visible groups", "find, ms", "draw, ms", "wrong pixels", "judged",
+             "groups missed");
   for (std::size_t c = 0; c < contenders.size(); ++c) {
     const FlightSum sum = sum_of(flight, c);
-    std::uint64_t wrong_px = 0;
-    for (const std::uint64_t wrong : sum.wrong_px) wrong_px += wrong;
-    fmt::print("{:<10} {:>10.0f} {:>7.1f} % {:>16.2f}x {:>9.3f} {:>9.2f} {:>13} {:>13}\n",
+    const auto total = [](const auto& by_scale) {
+      return std::accumulate(by_scale.begin(), by_scale.end(), std::uint64_t{0});
+    };
+    fmt::print("{:<13} {:>9.0f} {:>6.1f} % {:>16.2f}x {:>9.3f} {:>9.2f} {:>12} {:>7} {:>13}\n",
                contenders[c].label, sum.drawn, 100 * sum.drawn / std::max(1.0, sum.in_view),
-               sum.drawn / std::max(1.0, sum.in_visible_groups), sum.find_ms, sum.draw_ms, wrong_px,
-               sum.missed_groups);
+               sum.drawn / std::max(1.0, sum.in_visible_groups), sum.find_ms, sum.draw_ms,
+               total(sum.wrong_px), total(sum.judged_wrong_px), sum.missed_groups);
   }
   fmt::print(
       "Drawn: triangles a frame, also as a share of those in view and as a multiple of those in "
-      "groups that are seen. Wrong pixels: of all frames and sizes.\n");
+      "groups that are seen. Wrong pixels: of all frames and sizes; judged: of those, what an "
+      "exact ray confirms.\n");
 }
 
 }  // namespace
@@ -221,7 +226,7 @@ int run_fly(const FlyOptions& options) {
   std::vector<std::pair<std::string, std::string>> pictures;
   ProgressBar bar(!options.common.json);
   const Flight flight = fly(
-      prepared.batches, shots, contenders,
+      scene.index, prepared.batches, shots, contenders,
       [&](std::size_t frame, std::size_t contender, const Target& whole, const Target& drawn) {
         if (!is_pictured(frame, shots.size(), options.pictures)) return;
         const Picture picture = frame_picture(scene.tin, scene.groups, whole, drawn);

@@ -8,6 +8,7 @@ namespace scarp {
 class Stopwatch {
  public:
   double seconds() const { return std::chrono::duration<double>(Clock::now() - begun_).count(); }
+  double ms() const { return 1000 * seconds(); }
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -1,21 +1,12 @@
 #include "cli/fly/flight.h"
 
 #include <algorithm>
-#include <chrono>
+
+#include "cli/fly/pixel_judge.h"
+#include "cli/stopwatch.h"
 
 namespace scarp {
 namespace {
-
-class Stopwatch {
- public:
-  double ms() const {
-    return std::chrono::duration<double, std::milli>(Clock::now() - begun_).count();
-  }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  Clock::time_point begun_ = Clock::now();
-};
 
 /// Draws some groups and the orphans.
 class Painter {
@@ -53,12 +44,6 @@ std::vector<GroupIndex> in_picture(const GroupBatches& batches, const Frustum& f
   return kept;
 }
 
-std::uint64_t differing_pixels(const Target& a, const Target& b) {
-  std::uint64_t count = 0;
-  for (std::size_t i = 0; i < a.object.size(); ++i) count += a.object[i] != b.object[i];
-  return count;
-}
-
 /// The pictures of everything in view, and what is seen in the finest.
 struct WholeFrame {
   std::array<Target, kPictureScales.size()> pictures;
@@ -68,14 +53,15 @@ struct WholeFrame {
 
 class Runner {
  public:
-  Runner(const GroupBatches& batches, std::vector<Contender>& contenders)
-      : batches_(batches), contenders_(contenders), painter_(batches) {
+  Runner(const TinIndex& index, const GroupBatches& batches, std::vector<Contender>& contenders)
+      : batches_(batches), contenders_(contenders), judge_(index), painter_(batches) {
     for (GroupIndex g = 0; g <= batches.groups(); ++g)
       for (const TriangleIndex t : batches.triangles(g)) {
         if (group_of_.size() <= t) group_of_.resize(t + 1);
         group_of_[t] = g;
       }
     for (GroupIndex g = 0; g < batches.groups(); ++g) all_groups_.push_back(g);
+    is_triangle_drawn_.resize(group_of_.size());
   }
 
   WholeFrame draw_whole(const Shot& shot) {
@@ -113,30 +99,48 @@ class Runner {
     picture = painter_.draw(shot, kPictureScales[0]);
     counts.draw_ms = drawing.ms();
     counts.drawn = painter_.triangles();
-    counts.wrong_px[0] = differing_pixels(picture, whole.pictures[0]);
-    for (std::size_t s = 1; s < kPictureScales.size(); ++s)
-      counts.wrong_px[s] =
-          differing_pixels(painter_.draw(shot, kPictureScales[s]), whole.pictures[s]);
-    std::vector<std::uint8_t> is_drawn(batches_.groups(), 0);
+    std::vector<std::uint8_t> is_drawn(batches_.groups() + 1, 0);
     for (const GroupIndex g : groups) is_drawn[g] = 1;
     for (GroupIndex g = 0; g < batches_.groups(); ++g)
       counts.missed_groups += whole.group_seen[g] && !is_drawn[g];
+    is_drawn.back() = 1;
+    for (std::size_t g = 0; g < group_of_.size(); ++g)
+      is_triangle_drawn_[g] = is_drawn[group_of_[g]];
+    count_wrong(0, shot, whole, picture, counts);
+    for (std::size_t s = 1; s < kPictureScales.size(); ++s)
+      count_wrong(s, shot, whole, painter_.draw(shot, kPictureScales[s]), counts);
     return counts;
   }
 
  private:
+  void count_wrong(std::size_t scale, const Shot& shot, const WholeFrame& whole,
+                   const Target& picture, FrameCounts& counts) const {
+    const Target& truth = whole.pictures[scale];
+    const Projection projection = look_at(shot.view, picture.width_px, picture.height_px);
+    for (int y = 0; y < picture.height_px; ++y)
+      for (int x = 0; x < picture.width_px; ++x) {
+        const std::size_t i = picture.index(x, y);
+        if (picture.object[i] == truth.object[i]) continue;
+        ++counts.wrong_px[scale];
+        counts.judged_wrong_px[scale] += judge_.is_wrong(shot.view.eye, projection, picture, x, y,
+                                                         truth.object[i], is_triangle_drawn_);
+      }
+  }
+
   const GroupBatches& batches_;
   std::vector<Contender>& contenders_;
+  PixelJudge judge_;
   Painter painter_;
+  std::vector<std::uint8_t> is_triangle_drawn_;
   std::vector<GroupIndex> group_of_;  // [triangles], groups() for orphans
   std::vector<GroupIndex> all_groups_;
 };
 
 }  // namespace
 
-Flight fly(const GroupBatches& batches, const std::vector<Shot>& shots,
+Flight fly(const TinIndex& index, const GroupBatches& batches, const std::vector<Shot>& shots,
            std::vector<Contender>& contenders, const SeeFrame& see, const Progress& progress) {
-  Runner runner(batches, contenders);
+  Runner runner(index, batches, contenders);
   Flight flight;
   flight.counts.resize(contenders.size());
   Target picture;

@@ -11,6 +11,7 @@
 #include "core/culling/culling_method.h"
 #include "core/culling/group_batches.h"
 #include "core/raster/rasterise.h"
+#include "core/sight/tin_index.h"
 #include "core/threads/progress.h"
 
 namespace scarp {
@@ -36,6 +37,8 @@ struct FrameCounts {
   double find_ms = 0;               ///< to find the groups, and which of them are in the picture
   double draw_ms = 0;               ///< to draw them at scale 1
   std::array<std::uint64_t, kPictureScales.size()> wrong_px{};
+  /// Of those: an exact ray through the pixel's centre reaches what was left out.
+  std::array<std::uint64_t, kPictureScales.size()> judged_wrong_px{};
 };
 
 /// A frame, whatever the method.
@@ -55,9 +58,9 @@ using SeeFrame = std::function<void(std::size_t frame, std::size_t contender, co
                                     const Target& drawn)>;
 
 /// Flies a path with every method and compares its pictures, number by number, with those of
-/// everything in view. Methods are asked in turn, each for every frame, so that those that
-/// remember earlier frames may.
-Flight fly(const GroupBatches& batches, const std::vector<Shot>& shots,
+/// everything in view; pixels that differ are judged by exact rays (PixelJudge). Methods are asked
+/// in turn, each for every frame, so that those that remember earlier frames may.
+Flight fly(const TinIndex& index, const GroupBatches& batches, const std::vector<Shot>& shots,
            std::vector<Contender>& contenders, const SeeFrame& see, const Progress& progress);
 
 }  // namespace scarp

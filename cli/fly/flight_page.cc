@@ -102,7 +102,8 @@ std::string table_of(const Flight& flight, const std::vector<Contender>& contend
       "<table><tr><th>method</th><th>claims no wrong pixel</th><th>triangles drawn</th>"
       "<th>of those in view</th><th>times those in visible groups</th><th>find, ms</th>"
       "<th>draw, ms</th>";
-  for (const int scale : kPictureScales) html += fmt::format("<th>wrong pixels, x{}</th>", scale);
+  for (const int scale : kPictureScales)
+    html += fmt::format("<th>wrong pixels, x{0}</th><th>judged wrong, x{0}</th>", scale);
   html += "<th>groups missed</th><th>prepared in, s</th><th>keeps, bytes</th></tr>\n";
   for (std::size_t c = 0; c < contenders.size(); ++c) {
     const FlightSum sum = sum_of(flight, c);
@@ -112,7 +113,8 @@ std::string table_of(const Flight& flight, const std::vector<Contender>& contend
         escaped(contenders[c].label), contenders[c].is_conservative ? "yes" : "no", sum.drawn,
         100 * sum.drawn / std::max(1.0, sum.in_view),
         sum.drawn / std::max(1.0, sum.in_visible_groups), sum.find_ms, sum.draw_ms);
-    for (const std::uint64_t wrong : sum.wrong_px) html += fmt::format("<td>{}</td>", wrong);
+    for (std::size_t s = 0; s < kPictureScales.size(); ++s)
+      html += fmt::format("<td>{}</td><td>{}</td>", sum.wrong_px[s], sum.judged_wrong_px[s]);
     html += fmt::format("<td>{}</td><td>{}</td><td>{}</td></tr>\n", sum.missed_groups,
                         std::isnan(contenders[c].prepare_s)
                             ? "in the scene"
@@ -137,7 +139,10 @@ FlightSum sum_of(const Flight& flight, std::size_t contender) {
     sum.in_visible_groups += static_cast<double>(truth.in_visible_groups) / frames;
     find_ms.push_back(counts.find_ms);
     draw_ms.push_back(counts.draw_ms);
-    for (std::size_t s = 0; s < kPictureScales.size(); ++s) sum.wrong_px[s] += counts.wrong_px[s];
+    for (std::size_t s = 0; s < kPictureScales.size(); ++s) {
+      sum.wrong_px[s] += counts.wrong_px[s];
+      sum.judged_wrong_px[s] += counts.judged_wrong_px[s];
+    }
     sum.missed_groups += counts.missed_groups;
   }
   sum.find_ms = median(std::move(find_ms));
@@ -147,7 +152,8 @@ FlightSum sum_of(const Flight& flight, std::size_t contender) {
 
 std::string flight_csv(const Flight& flight, const std::vector<Contender>& contenders) {
   std::string csv = "frame,method,in_view,visible,in_visible_groups,groups,drawn,find_ms,draw_ms";
-  for (const int scale : kPictureScales) csv += fmt::format(",wrong_px_x{}", scale);
+  for (const int scale : kPictureScales)
+    csv += fmt::format(",wrong_px_x{0},judged_wrong_px_x{0}", scale);
   csv += ",missed_groups\n";
   for (std::size_t frame = 0; frame < flight.truth.size(); ++frame)
     for (std::size_t c = 0; c < contenders.size(); ++c) {
@@ -156,7 +162,8 @@ std::string flight_csv(const Flight& flight, const std::vector<Contender>& conte
       csv += fmt::format("{},{},{},{},{},{},{},{:.4f},{:.3f}", frame, contenders[c].label,
                          truth.in_view, truth.visible, truth.in_visible_groups, counts.groups,
                          counts.drawn, counts.find_ms, counts.draw_ms);
-      for (const std::uint64_t wrong : counts.wrong_px) csv += fmt::format(",{}", wrong);
+      for (std::size_t s = 0; s < kPictureScales.size(); ++s)
+        csv += fmt::format(",{},{}", counts.wrong_px[s], counts.judged_wrong_px[s]);
       csv += fmt::format(",{}\n", counts.missed_groups);
     }
   return csv;

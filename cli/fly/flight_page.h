@@ -23,7 +23,7 @@ std::string flight_page(const Flight& flight, const std::vector<Contender>& cont
 struct FlightSum {
   double drawn = 0, in_view = 0, visible = 0, in_visible_groups = 0;  ///< mean triangles a frame
   double find_ms = 0, draw_ms = 0;                                    ///< medians
-  std::array<std::uint64_t, kPictureScales.size()> wrong_px{};
+  std::array<std::uint64_t, kPictureScales.size()> wrong_px{}, judged_wrong_px{};
   std::uint64_t missed_groups = 0;
 };
 FlightSum sum_of(const Flight& flight, std::size_t contender);

@@ -63,6 +63,7 @@ TEST_F(FlyCommand, MethodsThatClaimItShowNoWrongPixelAndLeaveSomethingOut) {
       }
       if (!method["claims_no_wrong_pixel"].get<bool>()) continue;
       EXPECT_EQ(method["wrong_px"], json::array({0, 0})) << name;
+      EXPECT_EQ(method["judged_wrong_px"], json::array({0, 0})) << name;
       EXPECT_EQ(method["missed_groups"], 0) << name;
     }
     EXPECT_EQ(methods, (std::set<std::string>{"frustum", "thesis", "certified", "cells", "law-tan",
