@@ -1,11 +1,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <optional>
 
 #include "cli/commands.h"
 #include "cli/fly/flight.h"
@@ -16,6 +16,7 @@
 #include "cli/outputs.h"
 #include "cli/progress_bar.h"
 #include "cli/scene_culling.h"
+#include "cli/stopwatch.h"
 #include "core/culling/box_tree.h"
 #include "core/culling/cell_culling.h"
 #include "core/culling/certified_hiding.h"
@@ -46,29 +47,30 @@ class EverythingInView : public CullingMethod {
 };
 
 constexpr char kPageName[] = "flight.html";
-/// Of the triangles, in the two levels that objects are counted with.
-constexpr double kCoarseShares[] = {0.25, 0.0625};
-
 constexpr float kSmallGapOpacity = 0.7F;
+
+/// Of the triangles in view that hom draws as occluders.
+constexpr double kEstimateShare = 0.25;
 
 /// What methods are made from; some of them share it.
 struct Prepared {
   GroupBatches batches;
   BoxTree tree;
+  std::optional<CoarseBatches> coarse;  ///< where a method that asks coarse levels flies
   double coarse_s = 0;
-  CoarseBatches coarse;
 
-  explicit Prepared(const LoadedScene& scene)
-      : batches(scene.tin, scene.groups), tree(batches), coarse(timed_coarse()) {}
-
- private:
-  CoarseBatches timed_coarse() {
-    const auto begun = std::chrono::steady_clock::now();
-    CoarseBatches made(batches, {std::begin(kCoarseShares), std::end(kCoarseShares)});
-    coarse_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-    return made;
+  Prepared(const LoadedScene& scene, bool with_coarse)
+      : batches(scene.tin, scene.groups), tree(batches) {
+    if (!with_coarse) return;
+    const Stopwatch watch;
+    coarse.emplace(batches, std::vector(std::begin(kQueryShares), std::end(kQueryShares)));
+    coarse_s = watch.seconds();
   }
 };
+
+bool is_wanted(const std::vector<std::string>& wanted, const std::string& method) {
+  return wanted.empty() || std::find(wanted.begin(), wanted.end(), method) != wanted.end();
+}
 
 /// Cells of view, the smallest an eighth as wide as the mean group is.
 std::vector<CellSpace> cells_of_view(const LoadedScene& scene) {
@@ -84,9 +86,9 @@ struct SectionsOfScene {
 
   SectionsOfScene(const Tin& tin, bool are_wanted) {
     if (!are_wanted) return;
-    const auto begun = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     sections = find_virtual_occluders(tin, {}).sections;
-    prepare_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+    prepare_s = watch.seconds();
   }
 
   std::uint64_t bytes() const {
@@ -102,8 +104,7 @@ std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& p
   std::vector<Contender> all;
   const auto add = [&](const std::string& label, bool is_conservative, double prepare_s,
                        std::uint64_t bytes, auto make) {
-    if (wanted.empty() || std::find(wanted.begin(), wanted.end(), label) != wanted.end())
-      all.push_back({label, is_conservative, prepare_s, bytes, make()});
+    if (is_wanted(wanted, label)) all.push_back({label, is_conservative, prepare_s, bytes, make()});
   };
   add("frustum", true, 0, 0,
       [&] { return std::make_unique<EverythingInView>(scene.groups.leaf_count); });
@@ -133,14 +134,26 @@ std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& p
     });
   add("law-tan", true, sections.prepare_s, sections.bytes(),
       [&] { return cells("law-tan", by_occluders()); });
+  MaskOptions plain;
+  plain.drawing = MaskDrawing::kByCentres;
+  add("mask-plain", false, 0, 0,
+      [&] { return std::make_unique<MaskCulling>(scene.tin, batches, prepared.tree, plain); });
   ImageCullingOptions hom;
-  add("hom", false, 0, 0, [&] { return std::make_unique<HomCulling>(batches, hom); });
+  const auto add_hom = [&](const char* label, DepthTest depth) {
+    add(label, false, 0, 0, [&] { return std::make_unique<HomCulling>(batches, depth, hom); });
+  };
+  hom.occluder_share = kEstimateShare;
+  add_hom("hom", DepthTest::kEstimate);
+  hom.occluder_share = 1;
+  add_hom("hybrid", DepthTest::kPyramid);
   hom.opacity = kSmallGapOpacity;
-  add("hom-0.7", false, 0, 0, [&] { return std::make_unique<HomCulling>(batches, hom); });
-  for (const QueryUse use : {QueryUse::kSameFrame, QueryUse::kNextFrame})
-    add(use == QueryUse::kSameFrame ? "lod-query" : "multi-frame", false, prepared.coarse_s,
-        prepared.coarse.bytes(),
-        [&] { return std::make_unique<QueryCulling>(batches, prepared.coarse, use); });
+  add_hom("hom-0.7", DepthTest::kPyramid);
+  add("volume-scan", false, 0, 0, [&] { return std::make_unique<VolumeScanCulling>(batches); });
+  if (prepared.coarse)
+    for (const QueryUse use : {QueryUse::kSameFrame, QueryUse::kNextFrame})
+      add(use == QueryUse::kSameFrame ? "lod-query" : "multi-frame", false, prepared.coarse_s,
+          prepared.coarse->bytes(),
+          [&] { return std::make_unique<QueryCulling>(batches, *prepared.coarse, use); });
   add("stop-and-wait", false, 0, 0, [&] { return std::make_unique<StopAndWaitCulling>(batches); });
   for (const std::string& name : wanted)
     if (std::none_of(all.begin(), all.end(), [&](const Contender& c) { return c.label == name; }))
@@ -212,7 +225,8 @@ int run_fly(const FlyOptions& options) {
       options.path_file.empty()
           ? find_path(scene, route_of(options.route), options.frames, options.seed)
           : read_path(options.path_file);
-  const Prepared prepared(scene);
+  const Prepared prepared(
+      scene, is_wanted(options.methods, "lod-query") || is_wanted(options.methods, "multi-frame"));
   std::vector<Contender> contenders = contenders_of(scene, prepared, options.methods);
 
   Lens lens;

@@ -18,6 +18,10 @@ class CoarseBatches {
 
   std::size_t levels() const { return levels_.size(); }
 
+  std::uint32_t triangles(std::size_t level, GroupIndex group) const {
+    return levels_[level].first_triangle[group + 1] - levels_[level].first_triangle[group];
+  }
+
   /// Adds a group at a level; its object number is the group's.
   void add_to(std::size_t level, GroupIndex group, GroupBatches::Drawing& drawing) const;
 

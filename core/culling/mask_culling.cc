@@ -7,6 +7,7 @@
 #include <queue>
 
 #include "core/culling/image_culling.h"
+#include "core/raster/rasterise.h"
 
 namespace scarp {
 namespace {
@@ -113,18 +114,20 @@ void erode(OcclusionMap& map, int margin_px) {
 
 MaskCulling::MaskCulling(const Tin& tin, const GroupBatches& batches, const BoxTree& tree,
                          const MaskOptions& options)
-    : batches_(batches),
-      tree_(tree),
-      options_(options),
-      mapper_(tin),
-      stamp_m_(tree.nodes().size(), 0) {}
+    : batches_(batches), tree_(tree), options_(options), mapper_(tin), place_(batches.groups()) {
+  if (tree.nodes().empty()) return;
+  const auto order = tree.groups_of(tree.nodes()[0]);
+  for (std::uint32_t i = 0; i < order.size(); ++i) place_[order[i]] = i;
+}
 
-void MaskCulling::choose_occluders(const Projection& projection, const Position& eye) {
+std::vector<TriangleIndex> MaskCulling::choose_occluders(Mask& mask) const {
   const auto orphans = batches_.triangles(batches_.groups());
-  occluders_.assign(orphans.begin(), orphans.end());
-  if (tree_.nodes().empty()) return;
-  const Frustum frustum(projection);
-  CellCoverage coverage(projection);
+  std::vector<TriangleIndex> occluders(orphans.begin(), orphans.end());
+  mask.is_occluder.assign(batches_.groups(), 0);
+  if (tree_.nodes().empty()) return occluders;
+  const Position& eye = mask.camera.eye;
+  const Frustum frustum(mask.projection);
+  CellCoverage coverage(mask.projection);
   const double least_square_m2 = options_.least_distance_m * options_.least_distance_m;
   using Entry = std::pair<double, std::uint32_t>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
@@ -152,69 +155,149 @@ void MaskCulling::choose_occluders(const Projection& projection, const Position&
       continue;
     }
     for (const GroupIndex g : tree_.groups_of(node)) {
+      if (!is_there(g)) continue;
+      mask.is_occluder[g] = 1;
       const auto triangles = batches_.triangles(g);
-      occluders_.insert(occluders_.end(), triangles.begin(), triangles.end());
+      occluders.insert(occluders.end(), triangles.begin(), triangles.end());
     }
     chosen += node.triangles;
     coverage.cover(node.box, node.triangles);
   }
+  return occluders;
 }
 
-void MaskCulling::mark(const Projection& projection, std::uint32_t index, double stamp_m) {
+void MaskCulling::draw(const std::vector<TriangleIndex>& occluders, const Mask& mask,
+                       OcclusionMap& map) {
+  if (options_.drawing == MaskDrawing::kConservatively)
+    return mapper_.draw(mask.projection, occluders, map);
+  GroupBatches::Drawing drawing;
+  for (GroupIndex g = 0; g < batches_.groups(); ++g)
+    if (mask.is_occluder[g]) batches_.add_to(g, drawing);
+  batches_.add_to(batches_.groups(), drawing);
+  Target target = empty_depth_target(map.width_px, map.height_px);
+  rasterise(target, project_all(mask.projection, drawing.vertices), drawing.triangles);
+  map.depth = std::move(target.depth);
+}
+
+void MaskCulling::mark(Mask& mask, std::uint32_t index) const {
   const BoxTree::Node& node = tree_.nodes()[index];
-  const bool is_hidden = is_covered(pyramid_, projection, node.box, 1);
-  stamp_m_[index] = is_hidden ? stamp_m : 0;
+  const bool is_hidden = is_covered(mask.pyramid, mask.projection, node.box, 1);
+  mask.stamp_m[index] = is_hidden ? mask.until_m : 0;
   if (is_hidden || node.count < options_.leaf_groups || node.left == kNone) return;
-  mark(projection, node.left, stamp_m);
-  mark(projection, node.right, stamp_m);
+  mark(mask, node.left);
+  mark(mask, node.right);
 }
 
-void MaskCulling::make_mask(const Camera& camera, const Projection& projection) {
+MaskCulling::Mask MaskCulling::make_mask(const Camera& camera, double travelled_m) {
+  const auto begin = [&](MaskStep step) {
+    if (options_.on_step) options_.on_step(step);
+  };
   const Shot& shot = *camera.shot;
-  map_.width_px = options_.width_px;
-  map_.height_px = std::max(1, options_.width_px * shot.height_px / shot.width_px);
-  choose_occluders(projection, camera.eye);
-  mapper_.draw(projection, occluders_, map_);
-  erode(map_, options_.margin_px);
-  pyramid_.build(map_.width_px, map_.height_px, map_.depth);
+  Mask mask;
+  mask.camera = camera;
+  mask.travelled_m = travelled_m;
+  mask.projection = look_at(shot.view, shot.width_px, shot.height_px);
+  OcclusionMap map;
+  map.width_px = options_.width_px;
+  map.height_px = std::max(1, options_.width_px * shot.height_px / shot.width_px);
+  begin(MaskStep::kChoose);
+  const std::vector<TriangleIndex> occluders = choose_occluders(mask);
+  begin(MaskStep::kDraw);
+  draw(occluders, mask, map);
+  begin(MaskStep::kErode);
+  // What is drawn by centres is eroded a pixel more, for those that are covered in part.
+  erode(map, options_.margin_px + (options_.drawing == MaskDrawing::kByCentres ? 1 : 0));
+  begin(MaskStep::kPyramid);
+  mask.pyramid.build(map.width_px, map.height_px, map.depth, options_.block);
+  begin(MaskStep::kMarkNodes);
   // Off the axis a place at a distance is less deep: the corner of the picture has the least.
   const double tangent_y = std::tan(shot.view.vertical_field_of_view_rad / 2);
   const double tangent_x = tangent_y * shot.width_px / shot.height_px;
   const double tangent = std::sqrt(tangent_x * tangent_x + tangent_y * tangent_y);
   const double depth_m = options_.least_distance_m / std::sqrt(1 + tangent * tangent);
   const double ball_m =
-      std::min(ball_of_margin_m(options_.margin_px, depth_m, std::atan(tangent_x), map_.width_px),
-               ball_of_margin_m(options_.margin_px, depth_m, std::atan(tangent_y), map_.height_px));
-  std::fill(stamp_m_.begin(), stamp_m_.end(), 0);
-  critical_until_m_ = travelled_m_ + ball_m;
-  if (!tree_.nodes().empty()) mark(projection, 0, critical_until_m_);
-  critical_ = camera;
+      std::min(ball_of_margin_m(options_.margin_px, depth_m, std::atan(tangent_x), map.width_px),
+               ball_of_margin_m(options_.margin_px, depth_m, std::atan(tangent_y), map.height_px));
+  mask.until_m = travelled_m + ball_m;
+  mask.stamp_m.assign(tree_.nodes().size(), 0);
+  if (!tree_.nodes().empty()) mark(mask, 0);
+  begin(MaskStep::kDone);
+  return mask;
+}
+
+void MaskCulling::take(Mask mask) {
+  mask_ = std::move(mask);
   ++critical_frames_;
+}
+
+void MaskCulling::take_awaited() {
+  if (!awaited_.valid()) return;
+  Mask mask = awaited_.get();
+  if (!is_awaited_void_) take(std::move(mask));
+  is_awaited_void_ = false;
+}
+
+/// Takes the stamps off a group and all above it; what else they held keeps them.
+void MaskCulling::unstamp(GroupIndex group) {
+  std::uint32_t index = 0;
+  for (;;) {
+    const BoxTree::Node& node = tree_.nodes()[index];
+    const double stamp_m = mask_->stamp_m[index];
+    mask_->stamp_m[index] = 0;
+    if (node.left == kNone) return;
+    for (const std::uint32_t child : {node.left, node.right})
+      mask_->stamp_m[child] = std::max(mask_->stamp_m[child], stamp_m);
+    const BoxTree::Node& left = tree_.nodes()[node.left];
+    index = place_[group] < left.first + left.count ? node.left : node.right;
+  }
+}
+
+bool MaskCulling::set_present(std::span<const std::uint8_t> is_present) {
+  take_awaited();
+  const std::vector<std::uint8_t> before = std::move(is_present_);
+  is_present_.assign(is_present.begin(), is_present.end());
+  for (GroupIndex g = 0; g < is_present_.size() && mask_; ++g) {
+    const bool was_there = before.empty() || before[g];
+    if (was_there && !is_present_[g] && mask_->is_occluder[g])
+      mask_.reset();  // the next frame is critical
+    else if (!was_there && is_present_[g])
+      unstamp(g);
+  }
+  return true;
 }
 
 CullingAnswer MaskCulling::visible(const Camera& camera) {
   assert(camera.shot);
   const Shot& shot = *camera.shot;
-  const Projection projection = look_at(shot.view, shot.width_px, shot.height_px);
   if (last_) {
     const Position move = between(last_->eye, camera.eye);
     travelled_m_ += std::sqrt(dot(move, move));
   }
   last_ = camera;
-  if (!critical_ || travelled_m_ >= critical_until_m_ ||
-      angle_rad(critical_->shot->view, shot.view) > options_.sharp_turn_rad)
-    make_mask(camera, projection);
+  take_awaited();
+  const auto has_turned = [&] {
+    return angle_rad(mask_->camera.shot->view, shot.view) > options_.sharp_turn_rad;
+  };
+  if (!mask_ || travelled_m_ >= mask_->until_m || has_turned())
+    take(make_mask(camera, travelled_m_));
+  else if (options_.in_background &&
+           travelled_m_ - mask_->travelled_m >= (mask_->until_m - mask_->travelled_m) / 2)
+    awaited_ = std::async(std::launch::async, [this, camera, travelled_m = travelled_m_] {
+      return make_mask(camera, travelled_m);
+    });
+  is_fresh_ = mask_->travelled_m == travelled_m_ && mask_->camera.eye == camera.eye;
 
   CullingAnswer answer;
-  const Frustum frustum(projection);
+  const Frustum frustum(look_at(shot.view, shot.width_px, shot.height_px));
   const auto gather = [&](auto self, std::uint32_t index) -> void {
     const BoxTree::Node& node = tree_.nodes()[index];
     ++answer.nodes_tested;
     // A stamp at the very distance it was made for holds at least for the frame that made it.
-    if (stamp_m_[index] > 0 && travelled_m_ <= stamp_m_[index]) return;
+    if (mask_->stamp_m[index] > 0 && travelled_m_ <= mask_->stamp_m[index]) return;
     if (!frustum.may_show(node.box)) return;
     if (node.left == kNone) {
-      answer.visible_groups.push_back(tree_.groups_of(node)[0]);
+      const GroupIndex group = tree_.groups_of(node)[0];
+      if (is_there(group)) answer.visible_groups.push_back(group);
       return;
     }
     self(self, node.left);
@@ -223,6 +306,11 @@ CullingAnswer MaskCulling::visible(const Camera& camera) {
   if (!tree_.nodes().empty()) gather(gather, 0);
   std::sort(answer.visible_groups.begin(), answer.visible_groups.end());
   return answer;
+}
+
+bool MaskCulling::may_show(const Bounds& box) {
+  // A box that moves has no stamp; the eroded mask holds for it as long as for all others.
+  return !mask_ || !is_covered(mask_->pyramid, mask_->projection, box, 1);
 }
 
 }  // namespace scarp

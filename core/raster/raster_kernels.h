@@ -42,12 +42,6 @@ struct ScreenMap {
         guard_y(kGuardPx / half_height_px) {}
 };
 
-/// A corner on the screen, in subpixels from the upper left.
-struct ScreenCorner {
-  std::int32_t x, y;
-  double depth;
-};
-
 /// Requires a corner that is neither too near nor beyond the guard, up to rounding.
 ScreenCorner place_corner(const ScreenMap& map, const ClipPosition& p);
 

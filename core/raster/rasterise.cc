@@ -93,33 +93,16 @@ struct Tiling {
 };
 
 /// Adds the triangle unless it holds no pixel centre of the target for certain.
-inline void prepare(const Tiling& tiling, const ScreenCorner& a, ScreenCorner b, ScreenCorner c,
-                    std::uint32_t object, Chunk& out) {
+inline void prepare(const Tiling& tiling, const ScreenCorner& a, const ScreenCorner& b,
+                    const ScreenCorner& c, std::uint32_t object, Chunk& out) {
   const int left = std::max(0, first_centre(std::min({a.x, b.x, c.x})));
   const int right = std::min(tiling.width_px, first_centre(std::max({a.x, b.x, c.x}))) - 1;
   const int top = std::max(0, first_centre(std::min({a.y, b.y, c.y})));
   const int bottom = std::min(tiling.height_px, first_centre(std::max({a.y, b.y, c.y}))) - 1;
   if ((left > right) | (top > bottom)) return;
-  std::int64_t x1 = b.x - a.x, y1 = b.y - a.y;
-  std::int64_t x2 = c.x - a.x, y2 = c.y - a.y;
-  std::int64_t twice_area = x1 * y2 - x2 * y1;
-  if (twice_area == 0) return;
-  if (twice_area < 0) {
-    std::swap(b, c);
-    std::swap(x1, x2);
-    std::swap(y1, y2);
-    twice_area = -twice_area;
-  }
-  const double depth1 = b.depth - a.depth;
-  const double depth2 = c.depth - a.depth;
-  const double scale = 1 / static_cast<double>(twice_area);
-  out.triangles.push_back(
-      {{a.x, b.x, c.x},
-       {a.y, b.y, c.y},
-       a.depth,
-       (depth1 * static_cast<double>(y2) - depth2 * static_cast<double>(y1)) * scale,
-       (depth2 * static_cast<double>(x1) - depth1 * static_cast<double>(x2)) * scale,
-       object});
+  ScreenTriangle triangle;
+  if (!set_up(a, b, c, object, triangle)) return;
+  out.triangles.push_back(triangle);
   out.ranges.push_back({static_cast<std::uint16_t>(left / kTileWidthPx),
                         static_cast<std::uint16_t>(right / kTileWidthPx),
                         static_cast<std::uint16_t>(top / kTileHeightPx),

@@ -17,6 +17,12 @@ inline int first_centre(std::int64_t subpixels) {
   return static_cast<int>((subpixels - kHalfPixel + kSubpixels - 1) >> 8);
 }
 
+/// A corner on the screen, in subpixels from the upper left.
+struct ScreenCorner {
+  std::int32_t x, y;
+  double depth;
+};
+
 /// A triangle ready to be drawn: corners in subpixels from the upper left, clockwise on the screen;
 /// depth as a plane from the first corner, by subpixels.
 struct ScreenTriangle {
@@ -35,6 +41,32 @@ struct ScreenTriangle {
   }
   float depth_step() const { return static_cast<float>(depth_per_x * kSubpixels); }
 };
+
+/// Makes a triangle of its corners, however they turn.
+/// @return whether it has any area; without, nothing is made
+inline bool set_up(const ScreenCorner& a, ScreenCorner b, ScreenCorner c, std::uint32_t object,
+                   ScreenTriangle& triangle) {
+  std::int64_t x1 = b.x - a.x, y1 = b.y - a.y;
+  std::int64_t x2 = c.x - a.x, y2 = c.y - a.y;
+  std::int64_t twice_area = x1 * y2 - x2 * y1;
+  if (twice_area == 0) return false;
+  if (twice_area < 0) {
+    std::swap(b, c);
+    std::swap(x1, x2);
+    std::swap(y1, y2);
+    twice_area = -twice_area;
+  }
+  const double depth1 = b.depth - a.depth;
+  const double depth2 = c.depth - a.depth;
+  const double scale = 1 / static_cast<double>(twice_area);
+  triangle = {{a.x, b.x, c.x},
+              {a.y, b.y, c.y},
+              a.depth,
+              (depth1 * static_cast<double>(y2) - depth2 * static_cast<double>(y1)) * scale,
+              (depth2 * static_cast<double>(x1) - depth1 * static_cast<double>(x2)) * scale,
+              object};
+  return true;
+}
 
 /// A rectangle of a picture, [left, right) x [top, bottom) in pixels, and where its pixels are.
 struct PixelTile {

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <functional>
 #include <random>
@@ -168,6 +170,108 @@ TEST(MaskCulling, KeepsItsMaskWhileTheMarginPaysForTheWay) {
   });
   EXPECT_GE(critical, 1U);
   EXPECT_LT(critical, 5U);
+}
+
+/// A camera on the hills of walk().
+Shot shot_on_hills(double y_m) {
+  Shot shot;
+  shot.width_px = 160;
+  shot.height_px = 90;
+  shot.view.eye = {200, y_m, 60};
+  shot.view.target = {205, y_m + 100, 55};
+  return shot;
+}
+
+TEST(MaskCulling, TakingAnOccluderAwayForcesACriticalFrameAndNothingElseDoes) {
+  const test::GroupedGround scene = test::grouped_hills(2);
+  const GroupBatches batches(scene.tin, scene.groups);
+  const BoxTree tree(batches);
+  MaskOptions options;
+  options.least_distance_m = 20;
+  options.margin_px = 1;
+  MaskCulling mask(scene.tin, batches, tree, options);
+  std::vector<GroupIndex> all;
+  for (GroupIndex g = 0; g < batches.groups(); ++g) all.push_back(g);
+  const Shot shot = shot_on_hills(20);
+  const CullingAnswer first = mask.visible(camera_of(shot));
+  ASSERT_LT(first.visible_groups.size(), all.size());
+  // Take each group away in turn, at the same camera: pictures stay right, whatever it hid.
+  std::size_t forced = 0, shown_more = 0;
+  for (const GroupIndex taken : all) {
+    std::vector<std::uint8_t> present(all.size(), 1);
+    present[taken] = 0;
+    const std::uint64_t before = mask.critical_frames();
+    ASSERT_TRUE(mask.set_present(present));
+    const CullingAnswer answer = mask.visible(camera_of(shot));
+    forced += mask.critical_frames() - before;
+    shown_more += answer.visible_groups.size() > first.visible_groups.size();
+    std::vector<GroupIndex> others = all;
+    others.erase(others.begin() + taken);
+    ASSERT_EQ(test::picture_of(batches, answer.visible_groups, shot).object,
+              test::picture_of(batches, others, shot).object)
+        << "without group " << taken;
+    // Put back, it is drawn until the next mask, and so is what hides nothing new.
+    ASSERT_TRUE(mask.set_present(std::vector<std::uint8_t>(all.size(), 1)));
+    const CullingAnswer back = mask.visible(camera_of(shot));
+    const Frustum frustum(look_at(shot.view, shot.width_px, shot.height_px));
+    if (frustum.may_show(batches.box(taken))) {
+      EXPECT_TRUE(
+          std::binary_search(back.visible_groups.begin(), back.visible_groups.end(), taken));
+    }
+    ASSERT_EQ(test::picture_of(batches, back.visible_groups, shot).object,
+              test::picture_of(batches, all, shot).object);
+  }
+  EXPECT_GT(forced, 0U);
+  EXPECT_LT(forced, all.size()) << "groups beside the picture are no occluders";
+  EXPECT_GT(shown_more, 0U) << "something stood behind a group that was taken away";
+}
+
+TEST(MaskCulling, ASecondThreadMakesMasksBeforeTheyAreNeeded) {
+  const test::GroupedGround scene = test::grouped_hills(2);
+  const GroupBatches batches(scene.tin, scene.groups);
+  const BoxTree tree(batches);
+  std::vector<std::vector<GroupIndex>> answers[2];
+  for (const bool in_background : {false, true}) {
+    MaskOptions options;
+    options.least_distance_m = 20;
+    options.margin_px = 1;
+    options.in_background = in_background;
+    std::atomic<int> begun = 0, done = 0;
+    options.on_step = [&](MaskStep step) {
+      begun += step == MaskStep::kChoose;
+      done += step == MaskStep::kDone;
+    };
+    for (int repeat = 0; repeat < 2; ++repeat) {
+      MaskCulling mask(scene.tin, batches, tree, options);
+      std::vector<std::vector<GroupIndex>> groups;
+      for (int i = 0; i < 12; ++i)
+        groups.push_back(mask.visible(camera_of(shot_on_hills(20 + i * 0.04))).visible_groups);
+      if (repeat == 0)
+        answers[in_background] = groups;
+      else
+        EXPECT_EQ(groups, answers[in_background]) << "whatever the threads do";
+    }
+    EXPECT_EQ(begun, done);
+    EXPECT_GT(done, 2);
+  }
+  // Both leave something out, at every frame.
+  for (const auto& groups : answers)
+    for (const auto& frame : groups) EXPECT_LT(frame.size(), batches.groups());
+}
+
+TEST(MaskCulling, DrawnByCentresItErodesOnePixelMoreAndHidesMore) {
+  std::size_t plain = 0, conservative = 0;
+  for (const MaskDrawing drawing : {MaskDrawing::kConservatively, MaskDrawing::kByCentres}) {
+    MaskOptions options;
+    options.least_distance_m = 20;
+    options.margin_px = 2;
+    options.drawing = drawing;
+    std::size_t& drawn = drawing == MaskDrawing::kByCentres ? plain : conservative;
+    walk(1, 15, options, [&](const auto&, const Shot&, const CullingAnswer& answer, const auto&) {
+      drawn += answer.visible_groups.size();
+    });
+  }
+  EXPECT_LT(plain, conservative);
 }
 
 TEST(BoxTree, HoldsEveryGroupOnceInBoxesThatHoldItsChildren) {

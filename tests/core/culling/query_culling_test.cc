@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 
 #include "tests/support/grouped_ground.h"
@@ -50,26 +51,41 @@ class Queries : public testing::Test {
     return found;
   }
 
+  std::optional<GroupIndex> nearest_to(double y_m) const {
+    std::optional<GroupIndex> found;
+    double least = HUGE_VAL;
+    for (GroupIndex g = 0; g < batches_.groups(); ++g) {
+      const double off =
+          std::abs(batches_.box(g).low.y_m - y_m) + std::abs(batches_.box(g).low.x_m - 220);
+      if (off < least) least = off, found = g;
+    }
+    return found;
+  }
+  std::optional<GroupIndex> before_eye() const { return nearest_to(60); }
+  std::optional<GroupIndex> far_away() const { return nearest_to(420); }
+
   test::GroupedGround scene_ = ridge();
   GroupBatches batches_{scene_.tin, scene_.groups};
-  CoarseBatches coarse_{batches_, {0.5, 0.2}};
+  CoarseBatches coarse_{batches_, {std::begin(kQueryShares), std::end(kQueryShares)}};
 };
 
 TEST_F(Queries, CoarseLevelsHaveFewerTrianglesOfTheSameGroup) {
   for (GroupIndex g = 0; g < batches_.groups(); ++g) {
-    std::size_t before = batches_.triangles(g).size();
-    for (std::size_t level = 0; level < 2; ++level) {
+    const std::size_t whole = batches_.triangles(g).size();
+    std::size_t least = whole;
+    for (std::size_t level = 0; level < coarse_.levels(); ++level) {
       GroupBatches::Drawing drawing;
       coarse_.add_to(level, g, drawing);
-      EXPECT_LE(drawing.triangles.size(), before);
-      before = drawing.triangles.size();
+      EXPECT_LE(drawing.triangles.size(), whole);
+      EXPECT_EQ(drawing.triangles.size(), coarse_.triangles(level, g));
+      least = drawing.triangles.size();
       for (const std::uint32_t object : drawing.objects) EXPECT_EQ(object, g);
       for (const Position& p : drawing.vertices) {
         EXPECT_GE(p.x_m, batches_.box(g).low.x_m);
         EXPECT_LE(p.x_m, batches_.box(g).high.x_m);
       }
     }
-    EXPECT_LT(before, batches_.triangles(g).size());
+    EXPECT_LT(least, whole / 4);
   }
 }
 
@@ -101,6 +117,59 @@ TEST_F(Queries, MultiFrameTakesTheAnswersOfTheFrameBefore) {
                         std::back_inserter(in_both));
   EXPECT_EQ(in_both.size(), after.size()) << "what was hidden in the first frame stays left out";
   EXPECT_FALSE(after.empty());
+}
+
+TEST_F(Queries, LevelsStayWithinTheBudgetAndTheNearestAreFinest) {
+  std::vector<GroupIndex> all;
+  for (GroupIndex g = 0; g < batches_.groups(); ++g) all.push_back(g);
+  const Position eye{240, 40, 20};
+  const auto triangles = [&](const std::vector<std::uint8_t>& levels) {
+    std::uint64_t sum = 0;
+    for (const GroupIndex g : all)
+      sum += levels[g] == 0 ? batches_.triangles(g).size() : coarse_.triangles(levels[g] - 1U, g);
+    return sum;
+  };
+  const auto finest = levels_within(batches_, coarse_, eye, all, 3, 1'000'000'000);
+  EXPECT_EQ(std::count(finest.begin(), finest.end(), 0), static_cast<std::ptrdiff_t>(all.size()));
+  std::uint64_t before = 0;
+  for (const std::uint64_t budget : {1500, 2000, 3000, 4000}) {
+    const auto levels = levels_within(batches_, coarse_, eye, all, 3, budget);
+    const std::uint64_t used = triangles(levels);
+    EXPECT_LE(used, budget);
+    EXPECT_GT(used, before);
+    EXPECT_GT(used, budget * 9 / 10) << "and it is used";
+    before = used;
+    // A group beside the eye is never coarser than one far away of the same size.
+    EXPECT_LE(levels[*before_eye()], levels[*far_away()]);
+  }
+}
+
+TEST_F(Queries, MultiFrameFindsAgainWhatComesIntoSight) {
+  QueryCulling later(batches_, coarse_, QueryUse::kNextFrame);
+  later.visible(camera_at(240, 40));
+  later.visible(camera_at(240, 40));
+  // Over the ridge at once: boxes behind it were hidden, are asked now, and drawn at the next
+  // frame.
+  later.visible(camera_at(240, 300));
+  const auto after = later.visible(camera_at(240, 300)).visible_groups;
+  QueryCulling now(batches_, coarse_, QueryUse::kSameFrame);
+  for (const GroupIndex g : now.visible(camera_at(240, 300)).visible_groups)
+    EXPECT_TRUE(std::binary_search(after.begin(), after.end(), g)) << "boxes show no less";
+}
+
+TEST_F(Queries, MovingBoxesAreAskedAgainstWhatTheGroupsLeft) {
+  QueryCulling query(batches_, coarse_, QueryUse::kSameFrame);
+  StopAndWaitCulling wait(batches_);
+  for (CullingMethod* method :
+       {static_cast<CullingMethod*>(&query), static_cast<CullingMethod*>(&wait)}) {
+    Camera camera = camera_at(240, 40);
+    camera.shot->view.vertical_field_of_view_rad = 1.2;  // over the ridge, too
+    method->visible(camera);
+    EXPECT_TRUE(method->may_show({{238, 100, 2}, {242, 105, 4}})) << method->name();
+    EXPECT_FALSE(method->may_show({{238, 400, 2}, {242, 405, 4}})) << "behind the ridge";
+    EXPECT_TRUE(method->may_show({{238, 400, 200}, {242, 405, 204}})) << "in the air behind it";
+    EXPECT_FALSE(method->may_show({{238, -100, 2}, {242, -90, 4}})) << "behind the eye";
+  }
 }
 
 TEST_F(Queries, AHigherThresholdLeavesOutMore) {

@@ -115,7 +115,7 @@ TEST(CoveragePyramid, CoversABoxExactlyWhereEveryPixelOfItIsNearer) {
     for (int i = 0; i < width * height; ++i)
       depths.push_back(random() % 50 == 0 ? 0 : depth(random) + (repeat % 2 == 0 ? 0.5F : 0));
     CoveragePyramid pyramid;
-    pyramid.build(width, height, depths);
+    pyramid.build(width, height, depths, 2 + repeat % 3);
     for (int look = 0; look < 50; ++look) {
       const int x = static_cast<int>(random() % static_cast<unsigned>(width));
       const int y = static_cast<int>(random() % static_cast<unsigned>(height));
