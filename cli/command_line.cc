@@ -437,8 +437,9 @@ void add_fly(CLI::App& app, FlyOptions& o, std::function<int()>& run) {
                              "A CSV file with a camera a line: x,y,height_m,azimuth_deg,pitch_deg");
   c->add_option("--route", o.route,
                 "Find a path instead: walk or drive at 2 m along a valley's floor, "
-                "helicopter at 100 m, airliner at 10 km; walk unless given")
-      ->check(CLI::IsMember({"walk", "drive", "helicopter", "airliner"}))
+                "street at 2 m through a town, helicopter at 100 m, airliner at 10 km; walk unless "
+                "given")
+      ->check(CLI::IsMember({"walk", "drive", "street", "helicopter", "airliner"}))
       ->excludes(path);
   c->add_option("--frames", o.frames, "Frames of a path that is found; 120 unless given")
       ->check(CLI::Range(1, 1'000'000))
@@ -453,6 +454,14 @@ void add_fly(CLI::App& app, FlyOptions& o, std::function<int()>& run) {
       ->check(CLI::Range(16, 8192));
   c->add_option("--field-of-view", o.field_of_view_deg, "Vertical, degrees; 45 unless given")
       ->check(CLI::Range(1.0, 120.0));
+  c->add_option("--movers", o.movers,
+                "Vehicles and aircraft that move through the flight, some translucent; none unless "
+                "given")
+      ->check(CLI::Range(0, 10'000));
+  c->add_option("--changes", o.changes,
+                "Groups that are taken away or come back every ten frames; methods that prepared "
+                "for the scene as it was do not fly; none unless given")
+      ->check(CLI::Range(0, 1'000'000));
   c->add_option("--pictures", o.pictures, "Frames that are kept as pictures; 2 unless given")
       ->check(CLI::Range(0, 1000));
   add_common(*c, o.common);

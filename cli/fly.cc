@@ -41,6 +41,12 @@ class EverythingInView : public CullingMethod {
   }
   std::string_view name() const override { return "frustum"; }
   CullingAnswer visible(const Camera&) override { return all_; }
+  bool set_present(std::span<const std::uint8_t> is_present) override {
+    all_.visible_groups.clear();
+    for (GroupIndex g = 0; g < is_present.size(); ++g)
+      if (is_present[g]) all_.visible_groups.push_back(g);
+    return true;
+  }
 
  private:
   CullingAnswer all_;
@@ -164,7 +170,23 @@ std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& p
   return all;
 }
 
+/// Where the scene changes, methods that prepared for it cannot follow.
+void keep_those_that_follow(const LoadedScene& scene, std::vector<Contender>& contenders,
+                            const std::vector<std::string>& wanted) {
+  const std::vector<std::uint8_t> all(scene.groups.leaf_count, 1);
+  std::erase_if(contenders, [&](const Contender& contender) {
+    if (contender.method->set_present(all)) return false;
+    if (!wanted.empty())
+      throw Error(ErrorCode::kInput,
+                  fmt::format("--methods {}: was prepared for the scene as it is; leave it out, or "
+                              "--changes",
+                              contender.label));
+    return true;
+  });
+}
+
 Route route_of(const std::string& name) {
+  if (name == "street") return Route::kStreet;
   if (name == "walk") return Route::kWalk;
   if (name == "drive") return Route::kDrive;
   return name == "helicopter" ? Route::kHelicopter : Route::kAirliner;
@@ -191,9 +213,19 @@ nlohmann::json json_of(const Flight& flight, const std::vector<Contender>& conte
                        {"wrong_px", sum.wrong_px},
                        {"judged_wrong_px", sum.judged_wrong_px},
                        {"missed_groups", sum.missed_groups},
+                       {"movers", sum.movers},
+                       {"missed_movers", sum.missed_movers},
                        {"bytes", contenders[c].bytes}});
   }
-  return {{"frames", flight.truth.size()}, {"methods", methods}};
+  std::uint64_t movers = 0, visible_movers = 0;
+  for (const FrameTruth& truth : flight.truth) {
+    movers += truth.movers;
+    visible_movers += truth.visible_movers;
+  }
+  return {{"frames", flight.truth.size()},
+          {"movers_in_view", movers},
+          {"movers_visible", visible_movers},
+          {"methods", methods}};
 }
 
 void print_table(const Flight& flight, const std::vector<Contender>& contenders) {
@@ -228,21 +260,25 @@ int run_fly(const FlyOptions& options) {
   const Prepared prepared(
       scene, is_wanted(options.methods, "lod-query") || is_wanted(options.methods, "multi-frame"));
   std::vector<Contender> contenders = contenders_of(scene, prepared, options.methods);
+  if (options.changes > 0) keep_those_that_follow(scene, contenders, options.methods);
 
   Lens lens;
   lens.width_px = options.width_px;
   lens.height_px = std::max(1, options.width_px * 9 / 16);
   lens.vertical_field_of_view_deg = options.field_of_view_deg;
   const GeoFrame::Placer placer(scene.frame);
-  std::vector<Shot> shots;
-  for (const Waypoint& waypoint : path) shots.push_back(shot_at(placer, waypoint, lens));
+  FlightPlan plan;
+  for (const Waypoint& waypoint : path) plan.shots.push_back(shot_at(placer, waypoint, lens));
+  plan.movers = make_movers(scene, options.movers, options.route == "street", options.seed);
+  plan.changes = options.changes;
+  plan.seed = options.seed;
 
   std::vector<std::pair<std::string, std::string>> pictures;
   ProgressBar bar(!options.common.json);
   const Flight flight = fly(
-      scene.index, prepared.batches, shots, contenders,
+      scene.index, prepared.batches, plan, contenders,
       [&](std::size_t frame, std::size_t contender, const Target& whole, const Target& drawn) {
-        if (!is_pictured(frame, shots.size(), options.pictures)) return;
+        if (!is_pictured(frame, path.size(), options.pictures)) return;
         const Picture picture = frame_picture(scene.tin, scene.groups, whole, drawn);
         const std::string name = fmt::format("frame-{}-{}.png", frame, contenders[contender].label);
         write_png(folder.path_for(name), picture.width_px, picture.height_px, picture.rgb,
@@ -262,7 +298,7 @@ int run_fly(const FlyOptions& options) {
                flight_page(flight, contenders,
                            fmt::format("{} over {}: {} frames of {} x {} pixels", way,
                                        std::filesystem::path(options.scene).filename().string(),
-                                       shots.size(), lens.width_px, lens.height_px),
+                                       path.size(), lens.width_px, lens.height_px),
                            pictures));
   folder.commit();
   if (options.common.json)

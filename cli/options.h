@@ -191,6 +191,8 @@ struct FlyOptions {
   int width_px = 640;
   double field_of_view_deg = 45;  ///< vertical
   int pictures = 2;               ///< frames that are kept as pictures
+  int movers = 0;                 ///< vehicles and aircraft
+  std::uint32_t changes = 0;      ///< groups that come and go every few frames
 };
 
 struct PreviewCommandOptions {

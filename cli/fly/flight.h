@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cli/fly/flight_path.h"
+#include "cli/fly/movers.h"
 #include "core/culling/culling_method.h"
 #include "core/culling/group_batches.h"
 #include "core/raster/rasterise.h"
@@ -33,9 +34,11 @@ struct Contender {
 struct FrameCounts {
   std::uint32_t groups = 0;         ///< that it calls visible, in the picture
   std::uint32_t missed_groups = 0;  ///< of which a pixel is seen at the finest scale
-  std::uint64_t drawn = 0;          ///< triangles of those groups, and the orphans
-  double find_ms = 0;               ///< to find the groups, and which of them are in the picture
-  double draw_ms = 0;               ///< to draw them at scale 1
+  std::uint32_t movers = 0;         ///< that it draws
+  std::uint32_t missed_movers = 0;
+  std::uint64_t drawn = 0;  ///< triangles of those groups, and the orphans
+  double find_ms = 0;       ///< to find the groups, and which of them are in the picture
+  double draw_ms = 0;       ///< to draw them at scale 1
   std::array<std::uint64_t, kPictureScales.size()> wrong_px{};
   /// Of those: an exact ray through the pixel's centre reaches what was left out.
   std::array<std::uint64_t, kPictureScales.size()> judged_wrong_px{};
@@ -46,12 +49,24 @@ struct FrameTruth {
   std::uint64_t in_view = 0;            ///< triangles of the groups in the picture, and orphans
   std::uint64_t visible = 0;            ///< triangles with a pixel at the finest scale
   std::uint64_t in_visible_groups = 0;  ///< triangles of groups with a pixel there, and orphans
+  std::uint32_t movers = 0;             ///< in the picture
+  std::uint32_t visible_movers = 0;     ///< with a pixel at the finest scale
 };
 
 struct Flight {
   std::vector<FrameTruth> truth;                 ///< [frames]
   std::vector<std::vector<FrameCounts>> counts;  ///< [contenders][frames]
 };
+
+/// What happens on a flight.
+struct FlightPlan {
+  std::vector<Shot> shots;  ///< a frame each
+  std::vector<Mover> movers = {};
+  /// Groups that are taken away, or come back, every kChangeFrames; 0: the scene stays as it is.
+  std::uint32_t changes = 0;
+  std::uint64_t seed = 1;  ///< of the changes
+};
+inline constexpr std::size_t kChangeFrames = 10;
 
 /// Called with each frame as it is drawn whole at scale 1, and as a contender draws it.
 using SeeFrame = std::function<void(std::size_t frame, std::size_t contender, const Target& whole,
@@ -60,7 +75,11 @@ using SeeFrame = std::function<void(std::size_t frame, std::size_t contender, co
 /// Flies a path with every method and compares its pictures, number by number, with those of
 /// everything in view; pixels that differ are judged by exact rays (PixelJudge). Methods are asked
 /// in turn, each for every frame, so that those that remember earlier frames may.
-Flight fly(const TinIndex& index, const GroupBatches& batches, const std::vector<Shot>& shots,
+///
+/// Translucent movers are drawn last, over the depths of all else; a pixel is wrong where either
+/// number differs.
+/// Requires contenders that follow where the plan has changes.
+Flight fly(const TinIndex& index, const GroupBatches& batches, const FlightPlan& plan,
            std::vector<Contender>& contenders, const SeeFrame& see, const Progress& progress);
 
 }  // namespace scarp

@@ -104,7 +104,9 @@ std::string table_of(const Flight& flight, const std::vector<Contender>& contend
       "<th>draw, ms</th>";
   for (const int scale : kPictureScales)
     html += fmt::format("<th>wrong pixels, x{0}</th><th>judged wrong, x{0}</th>", scale);
-  html += "<th>groups missed</th><th>prepared in, s</th><th>keeps, bytes</th></tr>\n";
+  html +=
+      "<th>groups missed</th><th>movers drawn</th><th>movers missed</th><th>prepared in, "
+      "s</th><th>keeps, bytes</th></tr>\n";
   for (std::size_t c = 0; c < contenders.size(); ++c) {
     const FlightSum sum = sum_of(flight, c);
     html += fmt::format(
@@ -115,7 +117,8 @@ std::string table_of(const Flight& flight, const std::vector<Contender>& contend
         sum.drawn / std::max(1.0, sum.in_visible_groups), sum.find_ms, sum.draw_ms);
     for (std::size_t s = 0; s < kPictureScales.size(); ++s)
       html += fmt::format("<td>{}</td><td>{}</td>", sum.wrong_px[s], sum.judged_wrong_px[s]);
-    html += fmt::format("<td>{}</td><td>{}</td><td>{}</td></tr>\n", sum.missed_groups,
+    html += fmt::format("<td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+                        sum.missed_groups, sum.movers, sum.missed_movers,
                         std::isnan(contenders[c].prepare_s)
                             ? "in the scene"
                             : fmt::format("{:.3f}", contenders[c].prepare_s),
@@ -144,6 +147,8 @@ FlightSum sum_of(const Flight& flight, std::size_t contender) {
       sum.judged_wrong_px[s] += counts.judged_wrong_px[s];
     }
     sum.missed_groups += counts.missed_groups;
+    sum.movers += counts.movers;
+    sum.missed_movers += counts.missed_movers;
   }
   sum.find_ms = median(std::move(find_ms));
   sum.draw_ms = median(std::move(draw_ms));
@@ -154,7 +159,7 @@ std::string flight_csv(const Flight& flight, const std::vector<Contender>& conte
   std::string csv = "frame,method,in_view,visible,in_visible_groups,groups,drawn,find_ms,draw_ms";
   for (const int scale : kPictureScales)
     csv += fmt::format(",wrong_px_x{0},judged_wrong_px_x{0}", scale);
-  csv += ",missed_groups\n";
+  csv += ",missed_groups,movers_in_view,movers_visible,movers,missed_movers\n";
   for (std::size_t frame = 0; frame < flight.truth.size(); ++frame)
     for (std::size_t c = 0; c < contenders.size(); ++c) {
       const FrameTruth& truth = flight.truth[frame];
@@ -164,7 +169,8 @@ std::string flight_csv(const Flight& flight, const std::vector<Contender>& conte
                          counts.drawn, counts.find_ms, counts.draw_ms);
       for (std::size_t s = 0; s < kPictureScales.size(); ++s)
         csv += fmt::format(",{},{}", counts.wrong_px[s], counts.judged_wrong_px[s]);
-      csv += fmt::format(",{}\n", counts.missed_groups);
+      csv += fmt::format(",{},{},{},{},{}\n", counts.missed_groups, truth.movers,
+                         truth.visible_movers, counts.movers, counts.missed_movers);
     }
   return csv;
 }

@@ -25,6 +25,7 @@ struct FlightSum {
   double find_ms = 0, draw_ms = 0;                                    ///< medians
   std::array<std::uint64_t, kPictureScales.size()> wrong_px{}, judged_wrong_px{};
   std::uint64_t missed_groups = 0;
+  std::uint64_t movers = 0, missed_movers = 0;  ///< of all frames
 };
 FlightSum sum_of(const Flight& flight, std::size_t contender);
 

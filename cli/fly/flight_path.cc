@@ -27,6 +27,7 @@ struct Travel {
 
 Travel travel_of(Route route) {
   switch (route) {
+    case Route::kStreet:
     case Route::kWalk:
       return {2, 2, 0, 60};
     case Route::kDrive:
@@ -155,7 +156,8 @@ std::vector<Waypoint> find_path(const LoadedScene& scene, Route route, int frame
   const Travel travel = travel_of(route);
   std::vector<PlanPoint> points = route == Route::kAirliner
                                       ? straight_way(bounds_of(scene.tin.vertices), seed)
-                                      : valley_way(scene.index, seed);
+                                  : route == Route::kStreet ? street_way(scene.index, seed)
+                                                            : valley_way(scene.index, seed);
   if (points.size() < 2)
     throw Error(ErrorCode::kInput,
                 fmt::format("'{}': has no two places of ground that are connected; give --path",

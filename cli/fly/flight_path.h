@@ -18,6 +18,7 @@ struct Waypoint {
 
 /// Kinds of paths that are found on a scene.
 enum class Route {
+  kStreet,      ///< 2 m above the streets of a town, 2 m a frame
   kWalk,        ///< 2 m above a valley's floor, 2 m a frame
   kDrive,       ///< 2 m above it, 15 m a frame
   kHelicopter,  ///< 100 m above a valley, 40 m a frame

@@ -7,6 +7,7 @@ namespace scarp {
 namespace {
 
 constexpr Rgb kSky = {0.80, 0.87, 0.94};
+constexpr Rgb kMover = {0.10, 0.10, 0.12};
 constexpr int kMarkReachPx = 1;
 
 /// Light from the north-west, 45 degrees high.
@@ -39,6 +40,10 @@ Picture frame_picture(const Tin& tin, const Groups& groups, const Target& whole,
     const std::uint32_t triangle = drawn.object[i];
     if (triangle == kNone) {
       paint(i, kSky, 1);
+      continue;
+    }
+    if (triangle >= tin.triangles.size()) {
+      paint(i, kMover, 1);
       continue;
     }
     const GroupIndex group = groups.group_of_triangle[triangle];

@@ -32,13 +32,13 @@ struct CoarseGround {
 /// A valley is looked for within so many cells around.
 constexpr int kAroundCells = 8;
 
-CoarseGround coarse_ground(const TinIndex& index) {
-  const Bounds bounds = bounds_of(index.tin().vertices);
+/// Heights alone.
+CoarseGround heights_over(const TinIndex& index, const Bounds& bounds, int most_cells) {
   CoarseGround ground;
   ground.low_x_m = bounds.low.x_m, ground.low_y_m = bounds.low.y_m;
   const double width_m = bounds.high.x_m - bounds.low.x_m;
   const double depth_m = bounds.high.y_m - bounds.low.y_m;
-  ground.cell_m = std::max(width_m, depth_m) / kWayCells;
+  ground.cell_m = std::max(width_m, depth_m) / most_cells;
   ground.columns = std::max(1, static_cast<int>(width_m / ground.cell_m));
   ground.rows = std::max(1, static_cast<int>(depth_m / ground.cell_m));
   const auto cells =
@@ -49,6 +49,11 @@ CoarseGround coarse_ground(const TinIndex& index) {
     ground.height_m.push_back(index.ground_height_m(x_m, y_m).value_or(NAN));
   }
   ground.above_mean_m.assign(cells, NAN);
+  return ground;
+}
+
+CoarseGround coarse_ground(const TinIndex& index) {
+  CoarseGround ground = heights_over(index, bounds_of(index.tin().vertices), kWayCells);
   for (int row = 0; row < ground.rows; ++row)
     for (int column = 0; column < ground.columns; ++column) {
       double sum_m = 0;
@@ -124,22 +129,11 @@ std::vector<PlanPoint> rounded(std::vector<PlanPoint> way) {
   return way;
 }
 
-}  // namespace
-
-std::vector<PlanPoint> valley_way(const TinIndex& index, std::uint64_t seed) {
-  const CoarseGround ground = coarse_ground(index);
-  std::vector<std::size_t> floors;
-  for (std::size_t i = 0; i < ground.height_m.size(); ++i)
-    if (!std::isnan(ground.height_m[i])) floors.push_back(i);
-  if (floors.empty()) return {};
-  std::sort(floors.begin(), floors.end(), [&](std::size_t a, std::size_t b) {
-    return std::pair(ground.above_mean_m[a], a) < std::pair(ground.above_mean_m[b], b);
-  });
-  const double relief_m =
-      std::max(1.0, ground.above_mean_m[floors.back()] - ground.above_mean_m[floors.front()]);
-  // The lowest twentieth are floors of valleys.
-  floors.resize(floors.size() / 20 + 1);
-  SplitMix64 random(seed);
+/// A way from one of the floors, drawn by the seed, to that which is farthest of those it can
+/// reach.
+std::vector<PlanPoint> way_between(const CoarseGround& ground,
+                                   const std::vector<std::size_t>& floors, double relief_m,
+                                   SplitMix64& random) {
   const std::size_t start =
       floors[static_cast<std::size_t>(random.unit() * static_cast<double>(floors.size()))];
   const Ways ways = ways_from(ground, start, relief_m);
@@ -160,6 +154,88 @@ std::vector<PlanPoint> valley_way(const TinIndex& index, std::uint64_t seed) {
   way.push_back(ground.place(start));
   std::reverse(way.begin(), way.end());
   return rounded(std::move(way));
+}
+
+/// Where some vertices that the seed draws have most others around.
+Position densest_place(const Tin& tin, SplitMix64& random) {
+  constexpr int kCandidates = 32;
+  constexpr double kAroundM = 150;
+  Position densest = tin.vertices.front();
+  std::size_t most = 0;
+  for (int i = 0; i < kCandidates; ++i) {
+    const Position& at = tin.vertices[static_cast<std::size_t>(
+        random.unit() * static_cast<double>(tin.vertices.size()))];
+    const auto around = static_cast<std::size_t>(
+        std::count_if(tin.vertices.begin(), tin.vertices.end(), [&](const Position& p) {
+          return std::abs(p.x_m - at.x_m) < kAroundM && std::abs(p.y_m - at.y_m) < kAroundM;
+        }));
+    if (around > most) most = around, densest = at;
+  }
+  return densest;
+}
+
+/// Makes void of all cells that rise like walls, and of those beside them.
+void forbid_walls(CoarseGround& ground) {
+  constexpr double kWallM = 2.5;
+  std::vector<std::uint8_t> is_free(ground.height_m.size(), 0);
+  const auto any_near = [&](int column, int row, int reach, const auto& visit) {
+    for (int y = std::max(0, row - reach); y <= std::min(ground.rows - 1, row + reach); ++y)
+      for (int x = std::max(0, column - reach); x <= std::min(ground.columns - 1, column + reach);
+           ++x)
+        if (visit(ground.index(x, y))) return true;
+    return false;
+  };
+  for (int row = 0; row < ground.rows; ++row)
+    for (int column = 0; column < ground.columns; ++column) {
+      const double height_m = ground.height_m[ground.index(column, row)];
+      is_free[ground.index(column, row)] =
+          !std::isnan(height_m) && !any_near(column, row, kAroundCells, [&](std::size_t i) {
+            return ground.height_m[i] < height_m - kWallM;
+          });
+    }
+  for (int row = 0; row < ground.rows; ++row)
+    for (int column = 0; column < ground.columns; ++column) {
+      const std::size_t i = ground.index(column, row);
+      ground.above_mean_m[i] = 0;
+      if (any_near(column, row, 1, [&](std::size_t near) { return !is_free[near]; }))
+        ground.above_mean_m[i] = NAN;
+    }
+  for (std::size_t i = 0; i < ground.height_m.size(); ++i)
+    if (std::isnan(ground.above_mean_m[i])) ground.height_m[i] = NAN;
+}
+
+}  // namespace
+
+std::vector<PlanPoint> valley_way(const TinIndex& index, std::uint64_t seed) {
+  const CoarseGround ground = coarse_ground(index);
+  std::vector<std::size_t> floors;
+  for (std::size_t i = 0; i < ground.height_m.size(); ++i)
+    if (!std::isnan(ground.height_m[i])) floors.push_back(i);
+  if (floors.empty()) return {};
+  std::sort(floors.begin(), floors.end(), [&](std::size_t a, std::size_t b) {
+    return std::pair(ground.above_mean_m[a], a) < std::pair(ground.above_mean_m[b], b);
+  });
+  const double relief_m =
+      std::max(1.0, ground.above_mean_m[floors.back()] - ground.above_mean_m[floors.front()]);
+  // The lowest twentieth are floors of valleys.
+  floors.resize(floors.size() / 20 + 1);
+  SplitMix64 random(seed);
+  return way_between(ground, floors, relief_m, random);
+}
+
+std::vector<PlanPoint> street_way(const TinIndex& index, std::uint64_t seed) {
+  constexpr double kCellM = 4;
+  SplitMix64 random(seed);
+  const Position middle = densest_place(index.tin(), random);
+  const Bounds window{{middle.x_m - kStreetReachM, middle.y_m - kStreetReachM, 0},
+                      {middle.x_m + kStreetReachM, middle.y_m + kStreetReachM, 0}};
+  CoarseGround ground = heights_over(index, window, static_cast<int>(2 * kStreetReachM / kCellM));
+  forbid_walls(ground);
+  std::vector<std::size_t> streets;
+  for (std::size_t i = 0; i < ground.height_m.size(); ++i)
+    if (!std::isnan(ground.height_m[i])) streets.push_back(i);
+  if (streets.empty()) return {};
+  return way_between(ground, streets, 1, random);
 }
 
 }  // namespace scarp

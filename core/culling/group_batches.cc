@@ -70,21 +70,30 @@ void GroupBatches::add_to(GroupIndex group, Drawing& drawing) const {
   }
 }
 
-bool Frustum::may_show(const Bounds& box) const {
-  // A box is beside the picture when all its corners are beyond one of its planes.
-  std::uint32_t outside = 0x3f;
-  for (const Position& corner : corners_of(box)) {
-    const ClipPosition p = projection_.project(corner);
-    std::uint32_t bits = 0;
-    if (p.x < -p.w) bits |= 1;
-    if (p.x > p.w) bits |= 2;
-    if (p.y < -p.w) bits |= 4;
-    if (p.y > p.w) bits |= 8;
-    if (p.z > p.w) bits |= 16;
-    if (p.w < 0) bits |= 32;
-    outside &= bits;
+Frustum::Frustum(const Projection& projection) : projection_(projection) {
+  // Left, right, below, above, too near, behind.
+  constexpr int kAxis[] = {0, 0, 1, 1, 2, 3}, kSign[] = {1, -1, 1, -1, -1, 0};
+  const auto row = [&](int axis, int i) {
+    return projection.rows[static_cast<std::size_t>(4 * axis + i)];
+  };
+  for (std::size_t p = 0; p < planes_.size(); ++p) {
+    const auto at = [&](int i) { return row(3, i) + kSign[p] * row(kAxis[p], i); };
+    planes_[p] = {at(0), at(1), at(2), at(3)};
   }
-  return outside == 0;
+}
+
+bool Frustum::may_show(const Bounds& box) const {
+  // A box is beside the picture when even the corner that is farthest inwards is beyond a plane.
+  for (const Plane& p : planes_) {
+    const double x = p.a * (p.a > 0 ? box.high.x_m : box.low.x_m);
+    const double y = p.b * (p.b > 0 ? box.high.y_m : box.low.y_m);
+    const double z = p.c * (p.c > 0 ? box.high.z_m : box.low.z_m);
+    // Rounding is of the largest term; a box is not left out for it.
+    constexpr double kRounding = 0x1p-49;
+    const double margin = (std::abs(x) + std::abs(y) + std::abs(z) + std::abs(p.d)) * kRounding;
+    if (x + y + z + p.d < -margin) return false;
+  }
+  return true;
 }
 
 bool place_on_screen(const Projection& projection, const Bounds& box, int width_px, int height_px,

@@ -48,7 +48,7 @@ class GroupBatches {
 /// What a perspective picture can show of boxes.
 class Frustum {
  public:
-  Frustum(const Projection& projection) : projection_(projection) {}
+  Frustum(const Projection& projection);
 
   /// Whether a box may be in the picture. Side: never false for one that is.
   bool may_show(const Bounds& box) const;
@@ -56,7 +56,13 @@ class Frustum {
   const Projection& projection() const { return projection_; }
 
  private:
+  /// a x + b y + c z + d >= 0 is inside.
+  struct Plane {
+    double a, b, c, d;
+  };
+
   Projection projection_;
+  std::array<Plane, 6> planes_;
 };
 
 /// Where a box is on a screen.

@@ -74,6 +74,47 @@ TEST_F(FlyCommand, MethodsThatClaimItShowNoWrongPixelAndLeaveSomethingOut) {
   }
 }
 
+TEST_F(FlyCommand, MoversAreLeftOutOnlyWhereTheyAreHidden) {
+  const RunResult run =
+      run_scarp("$SCARP fly " + scene_ + " -o " + folder_->path("movers") +
+                " --route walk --seed 2 --frames 12 --width 160 --movers 60 --json");
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  const json result = json::parse(run.output);
+  EXPECT_GT(result["movers_visible"], 20);
+  EXPECT_LT(result["movers_visible"], result["movers_in_view"]);
+  for (const json& method : result["methods"]) {
+    const std::string name = method["method"];
+    EXPECT_LE(method["movers"], result["movers_in_view"]) << name;
+    if (name == "hzb" || name == "stop-and-wait") {
+      EXPECT_LT(method["movers"], result["movers_in_view"]) << name;
+    }
+    if (!method["claims_no_wrong_pixel"].get<bool>()) continue;
+    EXPECT_EQ(method["wrong_px"], json::array({0, 0})) << name;
+    EXPECT_EQ(method["missed_movers"], 0) << name;
+  }
+}
+
+TEST_F(FlyCommand, MethodsThatFollowStayRightInASceneThatChanges) {
+  const std::string fly = "$SCARP fly " + scene_ + " --overwrite -o " + folder_->path("changes") +
+                          " --route helicopter --frames 42 --width 160 --changes 6 --json";
+  const RunResult run = run_scarp(fly);
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  std::set<std::string> methods;
+  const json result = json::parse(run.output);
+  for (const json& method : result["methods"]) {
+    const std::string name = method["method"];
+    methods.insert(name);
+    if (name != "frustum" && name != "hzb") continue;
+    EXPECT_EQ(method["wrong_px"], json::array({0, 0})) << name;
+    EXPECT_EQ(method["missed_groups"], 0) << name;
+  }
+  EXPECT_TRUE(methods.count("mask") && methods.count("lod-query"));
+  EXPECT_FALSE(methods.count("certified"));
+  const RunResult refused = run_scarp(fly + " --methods certified");
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_NE(refused.errors.find("--changes"), std::string::npos) << refused.errors;
+}
+
 TEST_F(FlyCommand, WritesAPathThatRepeatsTheFlight) {
   const std::string first = folder_->path("first"), again = folder_->path("again");
   ASSERT_EQ(run_scarp("$SCARP fly " + scene_ + " -o " + first +
