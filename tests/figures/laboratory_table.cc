@@ -108,6 +108,7 @@ void wang(const Laboratory& lab) {
   for (std::size_t m = 0; m < margins.size(); ++m) {
     MaskOptions options;
     options.margin_px = margins[m];
+    options.width_px = lab.plan.shots[0].width_px;
     options.least_distance_m = kLeastDistanceM;
     options.drawing = MaskDrawing::kByCentres;
     if (m == kPaperMargin)
