@@ -14,7 +14,7 @@
 #include "cli/loaded_scene.h"
 #include "cli/outputs.h"
 #include "cli/progress_bar.h"
-#include "cli/stage_clock.h"
+#include "cli/stopwatch.h"
 #include "core/error/error.h"
 #include "ingest/mesh/mesh.h"
 #include "tiles/store/checksum.h"

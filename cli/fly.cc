@@ -16,7 +16,7 @@
 #include "cli/outputs.h"
 #include "cli/progress_bar.h"
 #include "cli/scene_culling.h"
-#include "cli/stage_clock.h"
+#include "cli/stopwatch.h"
 #include "core/culling/box_tree.h"
 #include "core/culling/cell_culling.h"
 #include "core/culling/certified_hiding.h"
@@ -73,6 +73,10 @@ struct Prepared {
     coarse_s = watch.seconds();
   }
 };
+
+bool is_wanted(const std::vector<std::string>& wanted, const std::string& method) {
+  return wanted.empty() || std::find(wanted.begin(), wanted.end(), method) != wanted.end();
+}
 
 /// Cells of view, the smallest an eighth as wide as the mean group is.
 std::vector<CellSpace> cells_of_view(const LoadedScene& scene) {

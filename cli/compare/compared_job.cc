@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cassert>
 
-#include "cli/stage_clock.h"
+#include "cli/stopwatch.h"
 
 namespace scarp {
 

@@ -9,7 +9,7 @@
 #include "cli/build/budget.h"
 #include "cli/build/certified_settings.h"
 #include "cli/scene_culling.h"
-#include "cli/stage_clock.h"
+#include "cli/stopwatch.h"
 #include "cli/verify.h"
 #include "core/culling/certified_culling.h"
 #include "core/culling/visible_groups.h"

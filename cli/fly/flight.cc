@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "cli/fly/pixel_judge.h"
-#include "cli/stage_clock.h"
+#include "cli/stopwatch.h"
 #include "core/occlusion/splitmix64.h"
 
 namespace scarp {

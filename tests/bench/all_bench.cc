@@ -24,7 +24,7 @@
 #include "cli/compare/compared_page.h"
 #include "cli/compare/groups_job.h"
 #include "cli/compare/jobs.h"
-#include "cli/stage_clock.h"
+#include "cli/stopwatch.h"
 #include "core/error/error.h"
 #include "core/threads/parallel_for.h"
 #include "core/viewshed/view_limits.h"

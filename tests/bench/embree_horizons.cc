@@ -10,7 +10,7 @@
 #include <numbers>
 #include <vector>
 
-#include "cli/stage_clock.h"
+#include "cli/stopwatch.h"
 #include "core/threads/parallel_for.h"
 #include "core/viewshed/view_limits.h"
 

@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/stage_clock.h"
+#include "cli/stopwatch.h"
 #include "core/horizon/stewart.h"
 #include "core/occlusion/certified/certify_groups.h"
 #include "core/occlusion/hidden_together.h"

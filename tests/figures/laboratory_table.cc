@@ -14,7 +14,7 @@
 #include "cli/fly/flight.h"
 #include "cli/fly/flight_page.h"
 #include "cli/loaded_scene.h"
-#include "cli/stage_clock.h"
+#include "cli/stopwatch.h"
 #include "core/culling/box_tree.h"
 #include "core/culling/image_culling.h"
 #include "core/culling/mask_culling.h"
