@@ -7,17 +7,6 @@
 
 namespace scarp {
 
-/// Wall time since it was made.
-class Stopwatch {
- public:
-  double seconds() const { return std::chrono::duration<double>(Clock::now() - begun_).count(); }
-  double ms() const { return 1000 * seconds(); }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  Clock::time_point begun_ = Clock::now();
-};
-
 /// What a stage of the pipeline took.
 struct StageCost {
   std::string name;
