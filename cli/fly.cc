@@ -85,10 +85,6 @@ std::vector<CellSpace> cells_of_view(const LoadedScene& scene) {
   return walk_and_flight(scene.tin, std::sqrt(area_m2 / std::max(1U, scene.groups.leaf_count)) / 8);
 }
 
-bool is_wanted(const std::vector<std::string>& wanted, const std::string& method) {
-  return wanted.empty() || std::find(wanted.begin(), wanted.end(), method) != wanted.end();
-}
-
 /// Virtual occluders, where a method that asks for them flies.
 struct SectionsOfScene {
   std::vector<UprightOccluder> sections;

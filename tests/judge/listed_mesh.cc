@@ -39,8 +39,9 @@ std::optional<Tin> built_mesh_of(const ListedDem& listed) {
   const SampleGrid grid = place_window(
       dem, source.read({(dem.columns - columns) / 2, (dem.rows - rows) / 2, columns, rows}));
   const CellMeasures cells = measure_cells(dem);
+  constexpr double kErrorCells = 0.1;  // what scarp build asks for unless told otherwise
   MeshOptions options;
-  options.max_error_m = kDefaultErrorCells * std::min(cells.cell_x_m, cells.cell_y_m);
+  options.max_error_m = kErrorCells * std::min(cells.cell_x_m, cells.cell_y_m);
   return mesh_samples(grid, options, {}).tin;
 }
 
