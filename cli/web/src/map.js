@@ -3,6 +3,7 @@ import maplibregl from 'maplibre-gl';
 import 'maplibre-gl/dist/maplibre-gl.css';
 import {ring, line} from './geometry.js';
 import {tile_json} from './api.js';
+import {CulledTiles} from './culled_tiles.js';
 import {ink, dark} from './theme.js';
 
 const CANVAS_SIDE = 2;
@@ -14,20 +15,13 @@ const feature = (coordinates, properties = {}, type = 'LineString') => ({
   geometry: {type, coordinates},
 });
 
-/** Heights as colours: low green ground, tan, rock, and snow; quiet, because hillshade is under it. */
-function relief_ramp({min_m, max_m}) {
-  const span = Math.max(1, max_m - min_m);
-  const colours = ['#4f8a77', '#86a878', '#c9bf8a', '#b98f68', '#9b7565', '#e9e4e0'];
-  return ['interpolate', ['linear'], ['elevation'], min_m - 1.001, '#0000', min_m - 1, colours[0],
-    ...colours.flatMap((colour, i) => [min_m + (span * i) / (colours.length - 1), colour])];
-}
-
 export class Map {
   /** @param element  of the page  @param store  state: the view is kept there */
   constructor(element, store) {
     this.store = store;
     this.element = element;
     this.layers = new Set();
+    this.culled = new CulledTiles();
     this.picture = Object.assign(document.createElement('canvas'), {width: CANVAS_SIDE, height: CANVAS_SIDE});
     const {view} = store.state;
     this.map = new maplibregl.Map({
@@ -77,9 +71,11 @@ export class Map {
     const frame = [[w, s], [e, s], [e, n], [w, n], [w, s]];
     const sources = {
       hillshade: {type: 'raster', ...tiles(hillshade)},
-      heights: {type: 'raster-dem', encoding: terrain.encoding ?? 'mapbox', ...tiles(terrain)},
       terrain: {type: 'raster-dem', encoding: terrain.encoding ?? 'mapbox', ...tiles(terrain)},
-      ...(groups && {groups: {type: 'raster', ...tiles(groups)}}),
+      ...(groups && {
+        groups: {type: 'raster', ...tiles(groups)},
+        culled: {type: 'raster', ...tiles(groups), tiles: [this.culled.tiles(scene.name)]},
+      }),
       picture: {type: 'canvas', canvas: this.picture, animate: false, coordinates: corners([w, s, e, n])},
       limits: empty, sight: empty, horizon: empty, camera: empty, edge: {...empty, data: feature(frame)},
       // Beyond the scene tiles have heights that mean nothing.
@@ -89,8 +85,8 @@ export class Map {
     const layers = [
       {id: 'paper', type: 'background'},
       {id: 'hillshade', type: 'raster', source: 'hillshade'},
-      {id: 'relief', type: 'color-relief', source: 'heights', paint: {'color-relief-color': relief_ramp(scene.heights)}},
-      ...(groups ? [{id: 'groups', type: 'raster', source: 'groups', paint: {'raster-resampling': 'nearest', 'raster-opacity': 0.55}}] : []),
+      ...(groups ? [{id: 'groups', type: 'raster', source: 'groups', paint: {'raster-resampling': 'nearest', 'raster-opacity': 0.8}},
+        {id: 'culled', type: 'raster', source: 'culled', paint: {'raster-resampling': 'nearest', 'raster-fade-duration': 0}}] : []),
       {id: 'beyond', type: 'fill', source: 'beyond', paint: {'fill-antialias': false}},
       {id: 'picture', type: 'raster', source: 'picture', layout: {visibility: 'none'}, paint: {'raster-fade-duration': 0, 'raster-resampling': 'nearest'}},
       {id: 'edge', type: 'line', source: 'edge', paint: {'line-width': 1, 'line-opacity': 0.4}},
@@ -104,7 +100,8 @@ export class Map {
     ];
     this.layers = new Set(layers.map(({id}) => id));
     this.map.setTerrain(null);
-    this.map.setStyle({version: 8, sources, layers}, {diff: false});
+    // No transitions: ground in 3D is painted once, and would keep what is half way.
+    this.map.setStyle({version: 8, sources, layers, transition: {duration: 0, delay: 0}}, {diff: false});
     await new Promise((done) => this.map.once('style.load', done));
     this.colour();
     this.show_layers(this.store.state);
@@ -118,7 +115,6 @@ export class Map {
     paint('paper', 'background-color', ink('--paper'));
     paint('beyond', 'fill-color', ink('--paper'));
     paint('hillshade', 'raster-brightness-max', dark() ? 0.62 : 1);
-    paint('relief', 'color-relief-opacity', dark() ? 0.25 : 0.38);
     paint('edge', 'line-color', ink('--ink'));
     paint('limits', 'line-color', ink('--ink'));
     paint('horizon', 'line-color', ink('--horizon'));
@@ -131,8 +127,10 @@ export class Map {
 
   show_layers(state) {
     const show = (layer, on) => this.layers.has(layer) && this.map.setLayoutProperty(layer, 'visibility', on ? 'visible' : 'none');
-    show('relief', state.relief);
+    // The server's hillshade is tinted by height.
+    if (this.layers.has('hillshade')) this.map.setPaintProperty('hillshade', 'raster-saturation', state.relief ? 0 : -1);
     show('groups', state.groups);
+    show('culled', state.tool === 'camera' && Boolean(state.camera));
     show('limits', state.tool === 'viewshed');
     for (const id of ['sight', 'sight-hidden', 'sight-casing']) show(id, state.tool === 'sight');
     show('horizon', state.tool === 'horizon');
@@ -198,9 +196,12 @@ export class Map {
     this.#draw('horizon', pieces.filter((piece) => piece.length > 1).map((piece) => feature(piece)));
   }
 
-  /** @param answer  of the process cull, or null */
-  show_culled(answer) {
-    this.culled = answer;
+  /** Which groups a camera's picture has, and which not.
+   *  @param visible  numbers of groups, or null: nothing is shown */
+  show_drawn(visible) {
+    this.culled.draw(visible);
+    const {scene} = this.store.state;
+    this.map.getSource('culled')?.setTiles([this.culled.tiles(scene)]);
   }
 
   draw_camera(camera, heading_deg, field_deg, reach_m) {

@@ -10,6 +10,7 @@ const HEIGHT = '50';
 
 export class CameraTool {
   #newest = new Newest();
+  #answer = null;
 
   constructor(page) {
     this.page = page;
@@ -24,6 +25,7 @@ export class CameraTool {
     bind_number($('camera-fov'), store, 'field_of_view_deg');
     $('camera-around').addEventListener('change', () => store.set({heading_deg: $('camera-around').checked ? null : 0}));
     $('camera-clear').addEventListener('click', () => store.set({camera: null}));
+    store.on(['theme'], () => this.#answer && page.map.show_drawn(this.#answer.visible));
     store.on(['scene', 'camera', 'heading_deg', 'field_of_view_deg', 'tool'], () => this.refresh());
   }
 
@@ -75,11 +77,14 @@ export class CameraTool {
   }
 
   #show(answer) {
+    this.#answer = answer;
+    this.page.map.show_layers(this.page.store.state);
     $('camera-bar').hidden = $('camera-legend').hidden = !answer;
-    this.page.map.show_culled(answer);
-    this.page.map.element.dataset.culled = answer ? String(answer.groups.hidden) : '';
+    this.page.map.show_drawn(answer?.visible ?? null);
+    const {total, in_view, visible} = answer?.groups ?? {};
+    const hidden = in_view - visible;
+    this.page.map.element.dataset.culled = answer ? String(hidden) : '';
     if (!answer) return $('camera-answer').replaceChildren();
-    const {total, in_view, visible, hidden} = answer.groups;
     const part = (className, n) => element('i', {className, style: `width:${(100 * n) / total}%`});
     $('camera-bar').replaceChildren(part('seen', visible), part('culled', hidden));
     $('camera-answer').replaceChildren(

@@ -76,17 +76,17 @@ export class SightTool {
     this.#answer = answer;
     $('sight-download').disabled = !answer;
     const text = $('sight-answer');
-    text.classList.toggle('seen', answer?.visible === true);
-    text.classList.toggle('blocked', answer?.visible === false);
+    text.classList.toggle('seen', answer?.sight === 'visible');
+    text.classList.toggle('blocked', answer?.sight === 'hidden');
     text.replaceChildren(...(answer ? this.#words(answer) : []));
     this.blocker.put(answer?.blocker ?? null);
     this.#draw();
-    this.page.map.element.dataset.sight = answer ? `${answer.visible}` : '';
+    this.page.map.element.dataset.sight = answer ? answer.sight : '';
   }
 
-  #words({visible, distance_m, clearance_m, blocker, least_target_height_m, least_eye_height_m}) {
-    if (visible === null) return [element('b', {textContent: 'Unknown'}), element('small', {textContent: `The line of ${distance(distance_m)} runs over ground of which nothing is known.`})];
-    if (visible) {
+  #words({sight, distance_m, clearance_m, blocker, least_target_height_m, least_eye_height_m}) {
+    if (sight === 'unknown') return [element('b', {textContent: 'Unknown'}), element('small', {textContent: `The line of ${distance(distance_m)} runs over ground of which nothing is known.`})];
+    if (sight === 'visible') {
       const clear = Number.isFinite(clearance_m) ? `, ${metres(clearance_m)} clear of the ground at the closest` : '';
       return [element('b', {textContent: 'They see each other'}), element('small', {textContent: `${distance(distance_m)} apart${clear}.`})];
     }

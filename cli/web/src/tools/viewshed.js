@@ -4,6 +4,7 @@ import {execute, ground_m, viewshed_inputs} from '../api.js';
 import {Handle} from '../markers.js';
 import {Newest} from '../newest.js';
 import {coordinates, height} from '../store.js';
+import {legend} from '../colours.js';
 import {area, distance, metres, plural, share} from '../words.js';
 
 const QUESTION = ['scene', 'eyes', 'radius_m', 'min_distance_m', 'target_height_m', 'refraction', 'azimuth_deg', 'pitch_deg', 'mode'];
@@ -179,7 +180,8 @@ export class ViewshedTool {
 
   ask() {
     const {state} = this.page.store;
-    for (const id of ['download-tiff', 'download-geojson']) $(id).disabled = !state.eyes.length;
+    $('download-tiff').disabled = !state.eyes.length;
+    $('download-geojson').disabled = !state.eyes.length || state.mode === 'ground'; // outlines are of areas
     if (!state.eyes.length) {
       this.#newest.stop();
       this.page.map.hide_picture();
@@ -228,6 +230,9 @@ export class ViewshedTool {
   }
 
   #answer(state, headers, took_ms) {
+    const entries = legend(state.mode, state.eyes.length);
+    $('legend').hidden = !entries.length;
+    $('legend').replaceChildren(...entries.map(({colour, text}) => element('li', {}, element('b', {style: `background:${colour}`}), text)));
     const [seen, known] = ['X-Scarp-Visible-Cells', 'X-Scarp-Known-Cells'].map((key) => Number(headers.get(key)));
     const cell = this.page.scene().cell_m;
     const cell_m2 = Array.isArray(cell) ? cell[0] * cell[1] : cell * cell;
