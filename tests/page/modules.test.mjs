@@ -29,7 +29,7 @@ function any_state(next) {
     radius_m: Math.round(next() * 1e5) + 1,
     min_distance_m: pick([0, 250]),
     target_height_m: pick([0, 1.75]),
-    refraction: pick([0, 0.13, 0.25]),
+    refraction: pick([null, 0, 0.13, 0.25]),
     azimuth_deg: maybe(() => [350, 10.5]),
     pitch_deg: maybe(() => [-12, 30]),
     mode: pick(['visible', 'count', 'ground']),
@@ -72,13 +72,18 @@ describe('command', () => {
   const state = {...DEFAULTS, eyes: [{lon: -84.1, lat: 36.5, height: '2', name: ''}]};
 
   it('says all that was asked, and nothing else', () => {
-    assert.equal(command(state, 'alps.tif'), 'scarp viewshed alps.tif --observer -84.1,36.5,2 --crs OGC:CRS84 --max-distance 15000 -o seen.tif');
+    assert.equal(command(state, {name: 'alps', file: 'alps.tif'}), 'scarp viewshed alps.tif --observer -84.1,36.5,2 --crs OGC:CRS84 --max-distance 15000 -o seen.tif');
     const more = {...state, target_height_m: 1.5, azimuth_deg: [350, 10], pitch_deg: [-5, 5], mode: 'count', refraction: 0.13, min_distance_m: 100};
-    assert.equal(command(more, 'alps.tif'), 'scarp viewshed alps.tif --observer -84.1,36.5,2 --crs OGC:CRS84 --max-distance 15000 --min-distance 100 --target-height 1.5 --azimuth 350,10 --pitch -5,5 --mode count --refraction 0.13 -o count.tif');
+    assert.equal(command(more, {name: 'alps', file: 'alps.tif'}), 'scarp viewshed alps.tif --observer -84.1,36.5,2 --crs OGC:CRS84 --max-distance 15000 --min-distance 100 --target-height 1.5 --azimuth 350,10 --pitch -5,5 --mode count --refraction 0.13 -o count.tif');
+  });
+
+  it('takes over the air that a DEM is served with, and leaves a scene its own', () => {
+    assert.match(command(state, {name: 'a', file: 'a.tif', refraction: 0.25, earth: 'flat'}), / --refraction 0.25 --earth flat -o /);
+    assert.doesNotMatch(command(state, {name: 'a', kind: 'scene', refraction: 0.25}), /refraction/);
   });
 
   it('is empty while there is nothing to ask', () => {
-    for (const tool of ['viewshed', 'sight', 'horizon', 'camera']) assert.equal(command({...DEFAULTS, tool}, 'a'), '');
+    for (const tool of ['viewshed', 'sight', 'horizon', 'camera']) assert.equal(command({...DEFAULTS, tool}, {name: 'a'}), '');
   });
 
   it('quotes for a shell', () => {

@@ -55,14 +55,16 @@ export const execute = (process, inputs, {accept = 'application/json', signal} =
     signal,
   });
 
+const air = ({refraction}) => (refraction === null ? {} : {refraction});
+
 export function viewshed_inputs(state) {
   const inputs = {
     scene: state.scene,
     observers: state.eyes.map(position),
     max_distance_m: state.radius_m,
     target_height_m: state.target_height_m,
-    refraction: state.refraction,
     mode: state.mode,
+    ...air(state),
   };
   if (state.min_distance_m) inputs.min_distance_m = state.min_distance_m;
   if (state.azimuth_deg) inputs.azimuth = state.azimuth_deg;
@@ -74,14 +76,14 @@ export const sight_inputs = (state) => ({
   scene: state.scene,
   from: position(state.from),
   to: position(state.to),
-  refraction: state.refraction,
+  ...air(state),
 });
 
 export const horizon_inputs = (state) => ({
   scene: state.scene,
   at: position(state.point),
   azimuths: 360,
-  refraction: state.refraction,
+  ...air(state),
 });
 
 export function cull_inputs(state) {

@@ -5,10 +5,15 @@ import {position} from './store.js';
 export const quoted = (word) => (/^[\w@%+=:,./-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);
 
 /** Words of a command, an option with its value together, or null while there is nothing to ask.
- *  @param source  the name of the scene's file or folder */
-export function words(state, source) {
+ *  @param scene  as the server describes it */
+export function words(state, scene) {
+  const source = scene.file ?? scene.name;
   const crs = ['--crs', 'OGC:CRS84'];
-  const air = state.refraction ? [['--refraction', String(state.refraction)]] : [];
+  const refraction = state.refraction ?? scene.refraction ?? 0;
+  // A scene has its own air and earth.
+  const air = scene.kind === 'scene' ? [] : [
+    ...(refraction ? [['--refraction', String(refraction)]] : []),
+    ...(scene.earth === 'flat' ? [['--earth', 'flat']] : [])];
   if (state.tool === 'viewshed') {
     if (!state.eyes.length) return null;
     const options = [...state.eyes.map((eye) => ['--observer', position(eye)]), crs];
@@ -34,6 +39,6 @@ export function words(state, source) {
 }
 
 /** The same as pieces of one line, which may be broken between them. */
-export const pieces = (state, source) => words(state, source)?.map((piece) => piece.map(quoted).join(' ')) ?? [];
+export const pieces = (state, scene) => words(state, scene)?.map((piece) => piece.map(quoted).join(' ')) ?? [];
 
-export const command = (state, source) => pieces(state, source).join(' ');
+export const command = (state, scene) => pieces(state, scene).join(' ');

@@ -13,20 +13,24 @@ export class CulledTiles {
   #ids = new Map(); // group of each pixel by address, the last ones; -1 where there is no ground
   #drawn = null; // set of groups
   #version = 0;
+  #template = '';
 
   constructor() {
     maplibregl.addProtocol('scarp-culled', async ({url}, {signal}) => ({data: await this.#paint(url, signal)}));
   }
 
-  /** The address of the tiles as they are painted now. */
-  tiles(scene) {
-    return `scarp-culled://${this.#version}/scenes/${encodeURIComponent(scene)}/tiles/group-ids/{z}/{x}/{y}.png`;
+  /** Takes another scene; gives the address of the tiles painted with nothing known.
+   *  @param template  address of the tiles of its group numbers */
+  over(template) {
+    this.#template = template;
+    return this.draw(null);
   }
 
-  /** @param visible  numbers of the groups that are drawn, or null */
+  /** Paints anew; gives the address of the tiles now.
+   *  @param visible  numbers of the groups that are drawn, or null */
   draw(visible) {
     this.#drawn = visible && new Set(visible);
-    ++this.#version;
+    return `scarp-culled://${++this.#version}/${this.#template}`;
   }
 
   async #paint(url, signal) {
@@ -41,18 +45,18 @@ export class CulledTiles {
     return createImageBitmap(image);
   }
 
-  async #ids_of(path, signal) {
-    let ids = this.#ids.get(path);
+  async #ids_of(address, signal) {
+    let ids = this.#ids.get(address);
     if (!ids) {
-      const blob = await (await ask(path, {signal})).blob();
+      const blob = await (await ask(address, {signal})).blob();
       const bitmap = await createImageBitmap(blob, {colorSpaceConversion: 'none', premultiplyAlpha: 'none'});
       const context = new OffscreenCanvas(SIDE_PX, SIDE_PX).getContext('2d');
       context.drawImage(bitmap, 0, 0);
       const {data} = context.getImageData(0, 0, SIDE_PX, SIDE_PX);
       ids = Int32Array.from({length: SIDE_PX * SIDE_PX}, (_, i) => (data[4 * i + 3] ? (data[4 * i] << 16) | (data[4 * i + 1] << 8) | data[4 * i + 2] : -1));
     }
-    this.#ids.delete(path);
-    this.#ids.set(path, ids);
+    this.#ids.delete(address);
+    this.#ids.set(address, ids);
     if (this.#ids.size > KEPT_TILES) this.#ids.delete(this.#ids.keys().next().value);
     return ids;
   }

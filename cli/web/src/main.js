@@ -2,7 +2,7 @@
 import {$, element} from './dom.js';
 import {scenes, ground_m} from './api.js';
 import {pieces} from './command.js';
-import {Map} from './map.js';
+import {MapView} from './map.js';
 import {Newest} from './newest.js';
 import {decode, encode} from './permalink.js';
 import {DEFAULTS, THEMES, TOOLS, createStore, longitude, rounded} from './store.js';
@@ -19,7 +19,7 @@ const ADDRESS_MS = 250;
 
 const store = createStore(decode(location.hash));
 use_theme(store.state.theme);
-const map = new Map($('map'), store);
+const map = new MapView($('map'), store);
 let all = [];
 
 const page = {
@@ -244,7 +244,7 @@ function bind_panel() {
 
 function show_command() {
   const scene = page.scene();
-  const said = scene ? pieces(store.state, scene.file ?? scene.name) : [];
+  const said = scene ? pieces(store.state, scene) : [];
   $('command').replaceChildren(...said.flatMap((piece, i) => [i ? ' ' : '', element('span', {textContent: piece})]));
   $('command-box').hidden = !said.length;
 }
@@ -300,7 +300,7 @@ async function start() {
     return page.trouble(error);
   }
   $('scene').append(...all.map(({name, title}) => element('option', {value: name, textContent: title ?? name})));
-  $('scene').addEventListener('change', () => store.set({scene: $('scene').value, eyes: [], chosen: 0, from: null, to: null, point: null, camera: null}));
+  $('scene').addEventListener('change', () => store.set({scene: $('scene').value, refraction: null, eyes: [], chosen: 0, from: null, to: null, point: null, camera: null}));
   const asked = store.state.scene;
   if (!all.length) return page.trouble(new Error('The server has no scene. Give it one: scarp serve alps.tif'));
   if (!page.scene()) {

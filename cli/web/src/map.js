@@ -15,7 +15,7 @@ const feature = (coordinates, properties = {}, type = 'LineString') => ({
   geometry: {type, coordinates},
 });
 
-export class Map {
+export class MapView {
   /** @param element  of the page  @param store  state: the view is kept there */
   constructor(element, store) {
     this.store = store;
@@ -57,10 +57,11 @@ export class Map {
   /** Shows another scene. Throws Problem. */
   async show_scene(scene, keep_view) {
     await this.loaded;
-    const [hillshade, terrain, groups] = await Promise.all(
-      ['hillshade', 'terrain-rgb', scene.groups ? 'groups' : null].map((layer) => layer && tile_json(scene.name, layer)));
+    const [hillshade, terrain, groups, ids] = await Promise.all(
+      ['hillshade', 'terrain-rgb', ...(scene.groups ? ['groups', 'group-ids'] : [])].map((layer) => tile_json(scene.name, layer)));
+    const absolute = (template) => new URL(template, document.baseURI).href.replaceAll('%7B', '{').replaceAll('%7D', '}');
     const tiles = (json) => ({
-      tiles: json.tiles.map((template) => new URL(template, document.baseURI).href.replaceAll('%7B', '{').replaceAll('%7D', '}')),
+      tiles: json.tiles.map(absolute),
       minzoom: json.minzoom ?? 0,
       maxzoom: json.maxzoom ?? 16,
       bounds: json.bounds ?? scene.bounds,
@@ -74,7 +75,7 @@ export class Map {
       terrain: {type: 'raster-dem', encoding: terrain.encoding ?? 'mapbox', ...tiles(terrain)},
       ...(groups && {
         groups: {type: 'raster', ...tiles(groups)},
-        culled: {type: 'raster', ...tiles(groups), tiles: [this.culled.tiles(scene.name)]},
+        culled: {type: 'raster', ...tiles(ids), tiles: [this.culled.over(absolute(ids.tiles[0]))]},
       }),
       picture: {type: 'canvas', canvas: this.picture, animate: false, coordinates: corners([w, s, e, n])},
       limits: empty, sight: empty, horizon: empty, camera: empty, edge: {...empty, data: feature(frame)},
@@ -199,9 +200,7 @@ export class Map {
   /** Which groups a camera's picture has, and which not.
    *  @param visible  numbers of groups, or null: nothing is shown */
   show_drawn(visible) {
-    this.culled.draw(visible);
-    const {scene} = this.store.state;
-    this.map.getSource('culled')?.setTiles([this.culled.tiles(scene)]);
+    this.map.getSource('culled')?.setTiles([this.culled.draw(visible)]);
   }
 
   draw_camera(camera, heading_deg, field_deg, reach_m) {

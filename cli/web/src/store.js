@@ -13,7 +13,7 @@ export const DEFAULTS = Object.freeze({
   radius_m: 15000,
   min_distance_m: 0,
   target_height_m: 0,
-  refraction: 0,
+  refraction: null, // null: the scene's own
   azimuth_deg: null, // [from, to]
   pitch_deg: null, // [lowest, highest]
   mode: 'visible',

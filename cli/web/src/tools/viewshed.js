@@ -24,7 +24,7 @@ export class ViewshedTool {
     const {store} = page;
     bind_number($('radius'), store, 'radius_m', {scale: 0.001});
     bind_number($('target-height'), store, 'target_height_m', {empty: 0});
-    bind_number($('refraction'), store, 'refraction', {empty: 0});
+    bind_number($('refraction'), store, 'refraction', {empty: null});
     bind_number($('min-distance'), store, 'min_distance_m', {scale: 0.001, empty: 0});
     bind_pair([$('azimuth-from'), $('azimuth-to')], store, 'azimuth_deg');
     bind_pair([$('pitch-low'), $('pitch-high')], store, 'pitch_deg');
@@ -33,7 +33,7 @@ export class ViewshedTool {
     $('mode').addEventListener('change', () => store.set({mode: $('mode').value}));
     store.on(['mode'], ({mode}) => ($('mode').value = mode));
     const {min_distance_m, refraction, azimuth_deg, pitch_deg} = store.state;
-    $('limits').open = Boolean(min_distance_m || refraction || azimuth_deg || pitch_deg);
+    $('limits').open = Boolean(min_distance_m || refraction !== null || azimuth_deg || pitch_deg);
     $('eye-add').addEventListener('click', () => this.#add_next(!this.adding));
     $('eye-clear').addEventListener('click', () => store.set({eyes: [], chosen: 0}));
     $('download-tiff').addEventListener('click', () => this.#download('image/tiff', 'tif'));
@@ -46,6 +46,9 @@ export class ViewshedTool {
 
   /** All anew: after another scene or address. */
   refresh() {
+    const scene = this.page.scene();
+    $('refraction').disabled = scene.kind === 'scene'; // it was built with its own
+    $('refraction').placeholder = String(scene.refraction ?? 0);
     this.#list();
     this.#mark();
     this.#limits();
