@@ -446,6 +446,57 @@ void add_check(CLI::App& app, CheckOptions& o, std::function<int()>& run) {
   c->callback([&] { run = [&o] { return run_check(o); }; });
 }
 
+void add_serve(CLI::App& app, ServeOptions& o, std::function<int()>& run) {
+  CLI::App* c = app.add_subcommand("serve", "Answer over HTTP, with a page to look at");
+  c->footer(
+      "Example:\n  scarp serve alps.tif alps.scene\n"
+      "  curl 'http://127.0.0.1:8080/scenes/alps/height?at=8.65,46.55'\n"
+      "Each source is a scene of its own, by its file's name. Ends by SIGTERM or Ctrl-C.");
+  c->add_option("sources", o.sources, "Scenes, and any rasters that GDAL reads")->required();
+  c->add_option("--host", o.host,
+                "Address to listen on; 127.0.0.1, this machine only, unless given");
+  c->add_option("--port", o.port, "8080 unless given; 0: one that is free")
+      ->check(CLI::Range(0, 65'535));
+  c->add_option("--page", o.page_folder, "Folder of the page; the installed one unless given");
+  c->add_option("--cors", o.cors_origin,
+                "Let pages from this origin ask, such as https://maps.example; none unless given");
+  c->add_option("--tileset", o.tilesets, "NAME=FOLDER: 3D Tiles of a scene, to be served with it")
+      ->allow_extra_args(false);
+  add_surface(*c, o.dem);
+  ServeLimits& limits = o.limits;
+  const auto seconds_into = [](double& seconds, const char* name) {
+    return [&seconds, name](const std::string& text) {
+      const auto given = parse_duration(text);
+      if (!given)
+        throw Error(
+            ErrorCode::kUsage,
+            fmt::format("{} {}: not understood; a time such as 10s, 5min or 1h was expected", name,
+                        text));
+      seconds = *given;
+    };
+  };
+  c->add_option_function<std::string>("--time-limit", seconds_into(limits.time_s, "--time-limit"),
+                                      "Of an answer that is waited for; 30s unless given");
+  c->add_option_function<std::string>("--job-time-limit",
+                                      seconds_into(limits.job_time_s, "--job-time-limit"),
+                                      "Of a job; 10min unless given");
+  c->add_option("--max-cells", limits.cells,
+                "Cells that the eyes of one viewshed look at, together; 100000000 unless given");
+  c->add_option("--max-radius", limits.max_distance_m,
+                "Greatest distance of a viewshed, metres; 500000 unless given")
+      ->check(CLI::Range(1.0, 1e7));
+  c->add_option("--queue", limits.waiting,
+                "Requests that may wait for their turn; 128 unless given")
+      ->check(CLI::Range(1, 100'000));
+  c->add_option("--queue-per-client", limits.waiting_of_client, "Of one client; 32 unless given")
+      ->check(CLI::Range(1, 100'000));
+  c->add_option_function<std::string>(
+      "--cache", [&limits](const std::string& text) { limits.cache_bytes = parse_bytes(text); },
+      "Memory for tiles and viewsheds that were asked for; 128MiB unless given");
+  add_common(*c, o.common);
+  c->callback([&] { run = [&o] { return run_serve(o); }; });
+}
+
 /// "Error: message" without line breaks, so that scripts can rely on one line.
 int report(const std::string& message, int exit_code) {
   std::string line = message;
@@ -471,6 +522,7 @@ int run_command_line(int argc, char** argv) {
   SightOptions sight;
   HorizonOptions horizon;
   CheckOptions check;
+  ServeOptions serve;
   std::function<int()> run;
   add_build(app, build, run);
   add_cull(app, cull, run);
@@ -482,6 +534,7 @@ int run_command_line(int argc, char** argv) {
   add_sight(app, sight, run);
   add_horizon(app, horizon, run);
   add_check(app, check, run);
+  add_serve(app, serve, run);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& e) {
@@ -492,9 +545,9 @@ int run_command_line(int argc, char** argv) {
     return report(e.what(), 2);
   }
   try {
-    for (CommonOptions* common :
-         {&build.common, &cull.common, &verify.common, &compare.common, &fly.common,
-          &preview.common, &viewshed.common, &sight.common, &horizon.common, &check.common}) {
+    for (CommonOptions* common : {&build.common, &cull.common, &verify.common, &compare.common,
+                                  &fly.common, &preview.common, &viewshed.common, &sight.common,
+                                  &horizon.common, &check.common, &serve.common}) {
       if (!common->memory_budget_bytes) common->memory_budget_bytes = machine_memory_bytes() / 2;
       if (common->threads) set_thread_count(common->threads);
     }

@@ -18,6 +18,7 @@ int run_horizon(const HorizonOptions& options);
 /// Horizons of all samples of a DEM, and what is made of them.
 int run_all_horizons(const HorizonOptions& options);
 int run_check(const CheckOptions& options);
+int run_serve(const ServeOptions& options);
 
 /// Parses the command line and runs the subcommand. Exit code: 0 done, 1 the input or a resource
 /// is at fault (one line on standard error), 2 wrong use.

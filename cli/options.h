@@ -196,6 +196,29 @@ struct PreviewCommandOptions {
   int width_px = 1600;
 };
 
+/// What the server may be asked for; beyond it requests are refused.
+struct ServeLimits {
+  double time_s = 30;                 ///< of an answer that is waited for
+  double job_time_s = 600;            ///< of a job
+  std::uint64_t cells = 100'000'000;  ///< of a viewshed: of all eyes together
+  double max_distance_m = 500'000;
+  std::size_t waiting = 128, waiting_of_client = 32;
+  std::size_t jobs = 100, running_jobs = 16;
+  std::uint64_t cache_bytes = 128 << 20;  ///< of tiles and of viewsheds, together
+};
+
+struct ServeOptions {
+  CommonOptions common;
+  DemOptions dem;
+  std::vector<std::string> sources;  ///< scenes and DEM files, each a scene of its own
+  std::string host = "127.0.0.1";
+  int port = 8080;
+  std::string page_folder;            ///< empty: where the program was installed
+  std::string cors_origin;            ///< empty: none
+  std::vector<std::string> tilesets;  ///< NAME=FOLDER, 3D Tiles of a scene
+  ServeLimits limits;
+};
+
 struct CheckOptions {
   CommonOptions common;
   std::string scene;

@@ -1,11 +1,11 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
 #include "cli/progress_bar.h"
+#include "cli/sight_line.h"
 #include "cli/sight_picture.h"
 #include "cli/sight_surface.h"
 #include "core/error/error.h"
@@ -18,33 +18,9 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kSpeedOfLightMPerS = 299'792'458;
-
-const char* word_of(Sight sight) {
-  return sight == Sight::kVisible ? "visible" : sight == Sight::kHidden ? "hidden" : "unknown";
-}
-
 json or_null(const std::optional<double>& value) {
   return value ? json(*value) : json(nullptr);
 }
-
-/// The height above ground at which one end would be free, the other as it is.
-template <class Judge>
-std::optional<double> least_height_m(const SightSurface& surface, const SightEnd& end,
-                                     Judge judge) {
-  if (!end.ground_m) return {};
-  return least_free_height_m([&](double height_m) {
-    const MapPoint raised{end.map.x, end.map.y, *end.ground_m + height_m};
-    return judge(surface.place(raised).position) != Sight::kHidden;
-  });
-}
-
-/// Ground on the line that stands in the way.
-struct SightBlocker {
-  MapPoint map;
-  double distance_m = 0;
-  double clearance_m = 0;  ///< below 0
-};
 
 class SightRun {
  public:
@@ -75,86 +51,30 @@ class SightRun {
     DemOptions dem = options_.dem;
     dem.memory_budget_bytes = options_.common.memory_budget_bytes;
     surface_ = open_surface(options_.sources, dem, bar.stage("read"));
-    from_ = surface_->place(options_.from, options_.crs);
-    to_ = surface_->place(options_.to, options_.crs);
-    if (from_.position.x_m == to_.position.x_m && from_.position.y_m == to_.position.y_m)
-      throw Error(ErrorCode::kInput,
-                  fmt::format("--from {} and --to {}: are the same place on the map; two places "
-                              "were expected; move one of them",
-                              options_.from.text, options_.to.text));
   }
 
   void measure() {
-    const Position &a = from_.position, &b = to_.position;
-    const auto earth = surface_->frame().earth_frame();
-    sight_ = surface_->judge(a, b);
-    const GroundAlong along = surface_->ground_along(a, b);
-    void_at_end_ = along.void_at_end;
-    wavelength_m_ = options_.frequency_hz ? kSpeedOfLightMPerS / *options_.frequency_hz : 0;
-    profile_ = sight_profile(a, b, along, earth, wavelength_m_);
-    const GeoFrame::Placer placer(surface_->frame());
-    for (const ProfilePoint& point : profile_) ground_.push_back(placer.unplace(point.ground));
-    const Bearing bearing = EyeBearings(a, earth).to(b);
-    distance_m_ = bearing.distance_m;
-    azimuth_deg_ = bearing.azimuth_rad * 180 / M_PI;
-    find_blocker();
-    least_from_m_ =
-        least_height_m(*surface_, from_, [&](const Position& p) { return surface_->judge(p, b); });
-    least_to_m_ =
-        least_height_m(*surface_, to_, [&](const Position& p) { return surface_->judge(a, p); });
-    draw_line(placer, EyeBearings(a, earth));
-  }
-
-  void find_blocker() {
-    if (sight_ != Sight::kHidden) return;
-    const auto under = [](const SightEnd& end, double distance_m) {
-      const double ground_m = end.ground_m.value_or(end.map.height_m);
-      return SightBlocker{
-          {end.map.x, end.map.y, ground_m}, distance_m, end.map.height_m - ground_m};
-    };
-    if (surface_->starts_under_ground(from_.position, to_.position)) {
-      blocker_ = under(from_, 0);
-      return;
-    }
-    const auto first = std::find_if(profile_.begin(), profile_.end(),
-                                    [](const ProfilePoint& p) { return p.blocks; });
-    if (first == profile_.end()) {
-      blocker_ = under(to_, distance_m_);
-      return;
-    }
-    blocker_ = {ground_[static_cast<std::size_t>(first - profile_.begin())], first->distance_m,
-                first->clearance_m};
+    line_ = measure_sight(*surface_, surface_->place(options_.from, options_.crs),
+                          surface_->place(options_.to, options_.crs), options_.frequency_hz,
+                          options_.from.text, options_.to.text);
+    draw_line(GeoFrame::Placer(surface_->frame()),
+              EyeBearings(line_.from.position, surface_->frame().earth_frame()));
   }
 
   /// The line as it runs over the ground, dense enough to look smooth.
   void draw_line(const GeoFrame::Placer& placer, const EyeBearings& bearings) {
     constexpr int kParts = 160;
-    const Position &a = from_.position, &b = to_.position;
+    const Position &a = line_.from.position, &b = line_.to.position;
     GroundAlong parts;
     for (int i = 1; i < kParts; ++i)
       parts.crossings.push_back(
           {{i, kParts - i}, a.z_m + i * (b.z_m - a.z_m) / kParts, false, false});
-    drawn_.line.push_back({0, from_.map.height_m, 0});
+    drawn_.line.push_back({0, line_.from.map.height_m, 0});
     for (const ProfilePoint& p :
-         sight_profile(a, b, parts, surface_->frame().earth_frame(), wavelength_m_))
+         sight_profile(a, b, parts, surface_->frame().earth_frame(), line_.wavelength_m))
       drawn_.line.push_back(
           {bearings.to(p.line).distance_m, placer.unplace(p.line).height_m, p.fresnel_radius_m});
-    drawn_.line.push_back({distance_m_, to_.map.height_m, 0});
-  }
-
-  std::optional<std::size_t> least(double (*of)(const ProfilePoint&)) const {
-    if (profile_.empty()) return {};
-    const auto found = std::min_element(
-        profile_.begin(), profile_.end(),
-        [&](const ProfilePoint& p, const ProfilePoint& q) { return of(p) < of(q); });
-    return static_cast<std::size_t>(found - profile_.begin());
-  }
-  std::optional<std::size_t> least_clear() const {
-    return least([](const ProfilePoint& p) { return p.clearance_m; });
-  }
-  std::optional<std::size_t> least_ratio() const {
-    if (wavelength_m_ == 0) return {};
-    return least([](const ProfilePoint& p) { return p.fresnel_ratio(); });
+    drawn_.line.push_back({line_.distance_m, line_.to.map.height_m, 0});
   }
 
   json end_json(const SightEnd& end, const std::optional<double>& least_m) const {
@@ -171,27 +91,27 @@ class SightRun {
               {"earth", note.earth},
               {"refraction", note.refraction},
               {"heights", note.heights},
-              {"from", end_json(from_, least_from_m_)},
-              {"to", end_json(to_, least_to_m_)},
-              {"distance_m", distance_m_},
-              {"azimuth_deg", azimuth_deg_},
-              {"sight", word_of(sight_)},
+              {"from", end_json(line_.from, line_.least_from_m)},
+              {"to", end_json(line_.to, line_.least_to_m)},
+              {"distance_m", line_.distance_m},
+              {"azimuth_deg", line_.azimuth_deg},
+              {"sight", word_of(line_.sight)},
               {"first_blocker", nullptr},
               {"least_clearance", nullptr}};
-    if (blocker_)
-      r["first_blocker"] = {{"x", blocker_->map.x},
-                            {"y", blocker_->map.y},
-                            {"height_m", blocker_->map.height_m},
-                            {"distance_m", blocker_->distance_m},
-                            {"above_line_m", -blocker_->clearance_m}};
-    if (const auto i = least_clear())
-      r["least_clearance"] = {{"clearance_m", profile_[*i].clearance_m},
-                              {"distance_m", profile_[*i].distance_m}};
-    if (wavelength_m_ > 0) {
+    if (line_.blocker)
+      r["first_blocker"] = {{"x", line_.blocker->map.x},
+                            {"y", line_.blocker->map.y},
+                            {"height_m", line_.blocker->map.height_m},
+                            {"distance_m", line_.blocker->distance_m},
+                            {"above_line_m", -line_.blocker->clearance_m}};
+    if (const auto i = line_.least_clear())
+      r["least_clearance"] = {{"clearance_m", line_.profile[*i].clearance_m},
+                              {"distance_m", line_.profile[*i].distance_m}};
+    if (line_.wavelength_m > 0) {
       r["fresnel"] = {{"frequency_hz", *options_.frequency_hz}, {"least_ratio", nullptr}};
-      if (const auto i = least_ratio()) {
-        r["fresnel"]["least_ratio"] = profile_[*i].fresnel_ratio();
-        r["fresnel"]["distance_m"] = profile_[*i].distance_m;
+      if (const auto i = line_.least_ratio()) {
+        r["fresnel"]["least_ratio"] = line_.profile[*i].fresnel_ratio();
+        r["fresnel"]["distance_m"] = line_.profile[*i].distance_m;
       }
     }
     r["profile"] = profile_json();
@@ -200,16 +120,13 @@ class SightRun {
 
   json profile_json() const {
     json points = json::array();
-    for (std::size_t i = 0; i < profile_.size(); ++i) {
-      const ProfilePoint& p = profile_[i];
-      json point = {{"distance_m", p.distance_m},
-                    {"x", ground_[i].x},
-                    {"y", ground_[i].y},
-                    {"ground_m", ground_[i].height_m},
-                    {"clearance_m", p.clearance_m},
-                    {"blocks", p.blocks},
+    for (std::size_t i = 0; i < line_.profile.size(); ++i) {
+      const ProfilePoint& p = line_.profile[i];
+      json point = {{"distance_m", p.distance_m},   {"x", line_.ground[i].x},
+                    {"y", line_.ground[i].y},       {"ground_m", line_.ground[i].height_m},
+                    {"clearance_m", p.clearance_m}, {"blocks", p.blocks},
                     {"void_before", p.void_before}};
-      if (wavelength_m_ > 0) {
+      if (line_.wavelength_m > 0) {
         point["fresnel_radius_m"] = p.fresnel_radius_m;
         point["fresnel_ratio"] = p.fresnel_ratio();
       }
@@ -225,43 +142,45 @@ class SightRun {
   }
 
   std::string verdict() const {
-    if (!blocker_)
-      return sight_ == Sight::kVisible ? "visible" : "unknown: void ground may be in the way";
+    if (!line_.blocker)
+      return line_.sight == Sight::kVisible ? "visible" : "unknown: void ground may be in the way";
     return fmt::format(
         "hidden: at {:.10g},{:.10g}, {:.1f} m from the eye, the ground ({:.1f} m) "
         "stands {:.2f} m above the line",
-        blocker_->map.x, blocker_->map.y, blocker_->distance_m, blocker_->map.height_m,
-        -blocker_->clearance_m);
+        line_.blocker->map.x, line_.blocker->map.y, line_.blocker->distance_m,
+        line_.blocker->map.height_m, -line_.blocker->clearance_m);
   }
   std::string heights_text() const {
     return fmt::format("least height for a free line: of the eye {}; of the target {}",
-                       height_text(from_, least_from_m_), height_text(to_, least_to_m_));
+                       height_text(line_.from, line_.least_from_m),
+                       height_text(line_.to, line_.least_to_m));
   }
 
   std::string picture() {
-    if (from_.ground_m) drawn_.ground.push_back({0, *from_.ground_m, false});
-    for (std::size_t i = 0; i < profile_.size(); ++i)
+    if (line_.from.ground_m) drawn_.ground.push_back({0, *line_.from.ground_m, false});
+    for (std::size_t i = 0; i < line_.profile.size(); ++i)
       drawn_.ground.push_back(
-          {profile_[i].distance_m, ground_[i].height_m, profile_[i].void_before});
-    if (to_.ground_m) drawn_.ground.push_back({distance_m_, *to_.ground_m, void_at_end_});
-    drawn_.eye_foot_m = from_.ground_m;
-    drawn_.target_foot_m = to_.ground_m;
-    drawn_.sight = sight_;
+          {line_.profile[i].distance_m, line_.ground[i].height_m, line_.profile[i].void_before});
+    if (line_.to.ground_m)
+      drawn_.ground.push_back({line_.distance_m, *line_.to.ground_m, line_.void_at_end});
+    drawn_.eye_foot_m = line_.from.ground_m;
+    drawn_.target_foot_m = line_.to.ground_m;
+    drawn_.sight = line_.sight;
     drawn_.flat_earth = !surface_->frame().earth_frame();
-    if (blocker_)
-      drawn_.blocker = {blocker_->distance_m, blocker_->map.height_m,
+    if (line_.blocker)
+      drawn_.blocker = {line_.blocker->distance_m, line_.blocker->map.height_m,
                         fmt::format("ground {:.2f} m above the line, {:.0f} m away",
-                                    -blocker_->clearance_m, blocker_->distance_m)};
+                                    -line_.blocker->clearance_m, line_.blocker->distance_m)};
     const SurfaceNote note = note_of(*surface_);
     drawn_.title =
-        fmt::format("{} \u2192 {}: {}", options_.from.text, options_.to.text, word_of(sight_));
+        fmt::format("{} \u2192 {}: {}", options_.from.text, options_.to.text, word_of(line_.sight));
     drawn_.notes = {heights_text(),
                     fmt::format("surface {}, earth {}, refraction {:g}, heights {}", note.surface,
                                 note.earth, note.refraction, note.heights)};
-    if (const auto i = least_ratio())
+    if (const auto i = line_.least_ratio())
       drawn_.notes.back() +=
           fmt::format("; first Fresnel zone at {:g} GHz: {:.0f} % of its radius clear",
-                      *options_.frequency_hz / 1e9, 100 * profile_[*i].fresnel_ratio());
+                      *options_.frequency_hz / 1e9, 100 * line_.profile[*i].fresnel_ratio());
     return draw_profile(drawn_);
   }
 
@@ -278,28 +197,21 @@ class SightRun {
       return;
     }
     fmt::print("{}\n{}\n", verdict(), heights_text());
-    if (const auto i = least_clear())
-      fmt::print("least clearance {:.2f} m, {:.1f} m from the eye\n", profile_[*i].clearance_m,
-                 profile_[*i].distance_m);
-    if (const auto i = least_ratio())
+    if (const auto i = line_.least_clear())
+      fmt::print("least clearance {:.2f} m, {:.1f} m from the eye\n", line_.profile[*i].clearance_m,
+                 line_.profile[*i].distance_m);
+    if (const auto i = line_.least_ratio())
       fmt::print(
           "first Fresnel zone: {:.1f} % of its radius of {:.2f} m clear, {:.1f} m from the eye\n",
-          100 * profile_[*i].fresnel_ratio(), profile_[*i].fresnel_radius_m,
-          profile_[*i].distance_m);
+          100 * line_.profile[*i].fresnel_ratio(), line_.profile[*i].fresnel_radius_m,
+          line_.profile[*i].distance_m);
   }
 
   const SightOptions& options_;
   bool as_picture_ = false;
   std::optional<PartFile> file_;
   std::unique_ptr<SightSurface> surface_;
-  SightEnd from_, to_;
-  Sight sight_ = Sight::kUnknown;
-  std::vector<ProfilePoint> profile_;
-  std::vector<MapPoint> ground_;  ///< of each point of the profile
-  bool void_at_end_ = false;
-  double wavelength_m_ = 0, distance_m_ = 0, azimuth_deg_ = 0;
-  std::optional<SightBlocker> blocker_;
-  std::optional<double> least_from_m_, least_to_m_;
+  SightLine line_;
   PictureProfile drawn_;
 };
 

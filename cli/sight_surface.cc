@@ -20,7 +20,8 @@ double plan_distance_m(const Position& a, const Position& b) {
 
 class GridSurface : public SightSurface {
  public:
-  explicit GridSurface(Ground ground) : ground_(std::move(ground)), placer_(frame()) {}
+  explicit GridSurface(std::shared_ptr<const Ground> ground)
+      : owner_(std::move(ground)), ground_(*owner_), placer_(frame()) {}
 
   const char* name() const override { return "grid"; }
   const GeoFrame& frame() const override { return *ground_.dem.frame; }
@@ -59,44 +60,49 @@ class GridSurface : public SightSurface {
  private:
   static SightEnd end_of(const GroundEye& eye) { return {eye.position, eye.map, eye.ground_m}; }
 
-  Ground ground_;
+  std::shared_ptr<const Ground> owner_;
+  const Ground& ground_;
   GeoFrame::Placer placer_;
 };
 
 class TinSurface : public SightSurface {
  public:
-  explicit TinSurface(const std::string& path) : scene_(path), placer_(scene_.frame) {}
+  /// @param owner  of the others
+  TinSurface(std::shared_ptr<const void> owner, const TinIndex& index, const GeoFrame& frame)
+      : owner_(std::move(owner)), index_(index), frame_(frame), placer_(frame) {}
 
   const char* name() const override { return "tin"; }
-  const GeoFrame& frame() const override { return scene_.frame; }
+  const GeoFrame& frame() const override { return frame_; }
 
   SightEnd place(const TypedPosition& typed, const std::string& crs) const override {
-    return place(resolve(typed, crs, scene_.frame, scene_.index));
+    return place(resolve(typed, crs, frame_, index_));
   }
   SightEnd place(const MapPoint& map) const override {
-    return {placer_.place(map), map, ground_height_m(placer_, scene_.index, map.x, map.y)};
+    return {placer_.place(map), map, ground_height_m(placer_, index_, map.x, map.y)};
   }
 
   Sight judge(const Position& a, const Position& b) const override {
-    return line_of_sight(scene_.index, a, b);
+    return line_of_sight(index_, a, b);
   }
   GroundAlong ground_along(const Position& a, const Position& b) const override {
-    return scarp::ground_along(scene_.index, a, b);
+    return scarp::ground_along(index_, a, b);
   }
   bool starts_under_ground(const Position& a, const Position& b) const override {
-    const auto blocker = first_blocker(scene_.index, a, b);
+    const auto blocker = first_blocker(index_, a, b);
     return blocker && blocker->from == kNone && blocker->fraction == 0;
   }
 
   double reach_m(const Position& from) const override {
     double reach_m = 0;
-    for (const Position& p : scene_.tin.vertices)
+    for (const Position& p : index_.tin().vertices)
       reach_m = std::max(reach_m, plan_distance_m(from, p));
     return reach_m;
   }
 
  private:
-  LoadedScene scene_;
+  std::shared_ptr<const void> owner_;
+  const TinIndex& index_;
+  const GeoFrame& frame_;
   GeoFrame::Placer placer_;
 };
 
@@ -105,8 +111,18 @@ class TinSurface : public SightSurface {
 std::unique_ptr<SightSurface> open_surface(const std::vector<std::string>& sources,
                                            const DemOptions& options, const Progress& progress) {
   const std::string* scene = scene_among(sources, options);
-  if (!scene) return std::make_unique<GridSurface>(read_ground(sources, options, progress));
-  return std::make_unique<TinSurface>(*scene);
+  if (!scene)
+    return std::make_unique<GridSurface>(
+        std::make_shared<const Ground>(read_ground(sources, options, progress)));
+  const auto loaded = std::make_shared<const LoadedScene>(*scene);
+  return std::make_unique<TinSurface>(loaded, loaded->index, loaded->frame);
+}
+
+std::unique_ptr<SightSurface> surface_over(std::shared_ptr<const ViewSource> source) {
+  if (source->tin_index() != nullptr)
+    return std::make_unique<TinSurface>(source, *source->tin_index(), *source->dem().frame);
+  const Ground& ground = source->dem_ground();
+  return std::make_unique<GridSurface>(std::shared_ptr<const Ground>(std::move(source), &ground));
 }
 
 SurfaceNote note_of(const SightSurface& surface) {

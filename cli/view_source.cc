@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cli/loaded_scene.h"
 #include "core/error/error.h"
 #include "core/threads/parallel_for.h"
+#include "core/viewshed/seen_ground.h"
 #include "core/viewshed/tin_viewshed.h"
 #include "ingest/dem/ground_placement.h"
 
@@ -135,6 +137,46 @@ ViewGround ViewSource::ground() const {
       obstacles_ ? ViewGround::under(samples(), *obstacles_) : ViewGround(samples());
   ground.tops = &*tops_;
   return ground;
+}
+
+std::uint64_t ViewSource::groups() const {
+  if (!scene_) return 0;
+  std::uint64_t groups = 0;
+  for (const std::size_t i : scene_->used)
+    if (scene_->tiles.tile(i).contents) groups += scene_->tiles.tile(i).contents->groups;
+  return groups;
+}
+
+std::vector<GroupIndex> ViewSource::group_of_samples() const {
+  if (!scene_) return {};
+  // Triangles of the surface are those of the tiles, one tile after the other.
+  std::vector<GroupIndex> group_of_triangle;
+  for (const std::size_t i : scene_->used) {
+    const SceneTile& tile = scene_->tiles.tile(i);
+    const std::size_t triangles = tile.contents && scene_->used.size() > 1
+                                      ? static_cast<std::size_t>(tile.contents->triangles)
+                                      : scene_->tin.triangles.size();
+    const Groups groups = read_tile_groups(scene_->tiles.scene(), tile, triangles);
+    for (const GroupIndex group : groups.group_of_triangle)
+      group_of_triangle.push_back(group == kNone ? kNone : scene_->tiles.first_group(i) + group);
+  }
+  const GroundGrid& grid = samples();
+  const auto columns = static_cast<std::size_t>(grid.columns());
+  std::vector<GroupIndex> groups(columns * static_cast<std::size_t>(grid.rows()), kNone);
+  parallel_for(static_cast<std::size_t>(grid.rows()), [&](std::size_t r) {
+    for (std::size_t c = 0; c < columns; ++c) {
+      const Position at = grid.at(static_cast<std::int32_t>(c), static_cast<std::int32_t>(r));
+      const TriangleIndex triangle = scene_->index.triangle_at(at.x_m, at.y_m);
+      if (triangle != kNone && triangle < group_of_triangle.size())
+        groups[r * columns + c] = group_of_triangle[triangle];
+    }
+  });
+  return groups;
+}
+
+std::uint64_t ViewSource::known_samples() const {
+  std::call_once(known_once_, [&] { known_ = count_known(samples()); });
+  return known_;
 }
 
 GroundEye ViewSource::place(const TypedPosition& typed, const std::string& crs) const {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -40,10 +42,23 @@ class ViewSource {
   /// Its samples, where targets stand.
   const GroundGrid& samples() const { return ground_.grid; }
   ViewGround ground() const;
+  /// How many of the samples are known; counted when first asked for. From any thread.
+  std::uint64_t known_samples() const;
 
   /// Tiles of a scene, and how many of them were read; 0 of a DEM.
   std::size_t tiles() const { return scene_ ? scene_->tiles.size() : 0; }
   std::size_t tiles_read() const { return scene_ ? scene_->tiles.tiles_read() : 0; }
+
+  /// What stands on its own: the DEM with its grid. Requires a DEM.
+  const Ground& dem_ground() const { return ground_; }
+  /// Of a scene, the tiles that were read; null of a DEM.
+  const SceneTiles* scene_tiles() const { return scene_ ? &scene_->tiles : nullptr; }
+  const TinIndex* tin_index() const { return scene_ ? &scene_->index : nullptr; }
+  std::uint64_t triangles() const { return scene_ ? scene_->tin.triangles.size() : 0; }
+  std::uint64_t groups() const;  ///< leaves, of the tiles used
+  /// The group of the scene that each sample lies in, kNone where it is in none. [rows * columns]
+  /// Empty for a DEM. Reads the groups of all tiles used. Throws as read_tile_groups.
+  std::vector<GroupIndex> group_of_samples() const;
 
   /// Throws as place_eye does.
   GroundEye place(const TypedPosition& typed, const std::string& crs) const;
@@ -68,6 +83,8 @@ class ViewSource {
   Ground ground_;
   std::optional<GroundGrid> obstacles_;
   std::optional<GroundTops> tops_;  // of a DEM
+  mutable std::once_flag known_once_;
+  mutable std::uint64_t known_ = 0;
 };
 
 }  // namespace scarp

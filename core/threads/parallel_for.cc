@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/memory/large_array.h"
+#include "core/threads/stop.h"
 
 #ifndef SCARP_STD_THREADS
 #include <tbb/global_control.h>
@@ -22,6 +23,9 @@ namespace {
 
 std::atomic<int> asked_threads{0};
 
+/// Of the innermost StopScope of this thread.
+thread_local const StopAsked* innermost_stop = nullptr;
+
 int available_threads() {
   cpu_set_t set;
   if (sched_getaffinity(0, sizeof(set), &set) == 0) return std::max(1, CPU_COUNT(&set));
@@ -29,6 +33,18 @@ int available_threads() {
 }
 
 }  // namespace
+
+StopScope::StopScope(const StopAsked& asked) : outer_(innermost_stop) {
+  innermost_stop = &asked;
+}
+
+StopScope::~StopScope() {
+  innermost_stop = outer_;
+}
+
+bool stop_asked() {
+  return innermost_stop != nullptr && *innermost_stop && (*innermost_stop)();
+}
 
 void set_thread_count(int threads) {
   asked_threads = threads;
@@ -42,6 +58,7 @@ int thread_count() {
 #ifdef SCARP_STD_THREADS
 
 void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body) {
+  const StopAsked* stop = innermost_stop;
   std::atomic<std::size_t> next{0};
   std::exception_ptr failure;
   std::mutex failure_mutex;
@@ -50,6 +67,7 @@ void parallel_for(std::size_t count, const std::function<void(std::size_t)>& bod
     threads.emplace_back([&] {
       try {
         for (std::size_t i = next++; i < count; i = next++) {
+          if (stop != nullptr && *stop && (*stop)()) return;
           body(i);
           relieve_large_memory();
         }
@@ -72,7 +90,9 @@ void parallel_for(std::size_t count, const std::function<void(std::size_t)>& bod
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                   static_cast<std::size_t>(thread_count()));
   tbb::task_arena arena(thread_count());
+  const StopAsked* stop = innermost_stop;
   const auto one = [&](std::size_t i) {
+    if (stop != nullptr && *stop && (*stop)()) return;
     body(i);
     relieve_large_memory();
   };

@@ -182,13 +182,14 @@ void LeastHeight::add(const SampleWindow& window, std::span<const float> least_m
 }
 
 SampleWindow view_from(const ViewGround& ground, const std::optional<EarthFrame>& earth,
-                       const ViewshedEye& eye, std::span<Seen> sight, SweepCounts* counts) {
+                       const ViewshedEye& eye, std::span<Seen> sight, SweepCounts* counts,
+                       const Progress& progress) {
   const GroundGrid& grid = ground.stands;
   const EyeBearings bearings(eye.position, earth);
   const SampleWindow window = window_of(grid, eye, bearings);
   SweepCounts found;
   if (ground.tin) {
-    tin_viewshed(*ground.tin, grid, eye.position, eye.target_height_m, window, sight);
+    tin_viewshed(*ground.tin, grid, eye.position, eye.target_height_m, window, sight, progress);
     found = all_judged(window);
   } else {
     found = sweep_viewshed(ground.swept(), eye.position, eye.target_height_m, window, sight);

@@ -8,6 +8,7 @@
 #include "core/memory/large_array.h"
 #include "core/sight/tin_index.h"
 #include "core/terrain/ground_grid.h"
+#include "core/threads/progress.h"
 #include "core/viewshed/grid_sight.h"
 #include "core/viewshed/part_sweep.h"
 #include "core/viewshed/view_limits.h"
@@ -59,10 +60,11 @@ struct ViewGround {
 /// @param earth        of the grid's frame; nothing where it is flat
 /// @param sight[out]   [rows * columns]; only the window returned is written
 /// @return the window within reach; outside it nothing is within the limits
+/// @param progress     told over a TIN, where samples are judged one by one
 /// Cost: see part_sweep.h; with limits besides distance, a bearing for each sample seen.
 SampleWindow view_from(const ViewGround& ground, const std::optional<EarthFrame>& earth,
-                       const ViewshedEye& eye, std::span<Seen> sight,
-                       SweepCounts* counts = nullptr);
+                       const ViewshedEye& eye, std::span<Seen> sight, SweepCounts* counts = nullptr,
+                       const Progress& progress = {});
 
 /// How high above each sample a target must be at least for one eye to see it within its limits,
 /// metres along the normal, rounded up: NaN where that is not known (over void ground) or not to be

@@ -291,30 +291,57 @@ double GeoFrame::Placer::plane_direction_rad(const MapPoint& from, double azimut
   return std::atan2(ahead.y_m - behind.y_m, ahead.x_m - behind.x_m);
 }
 
-MapPoint convert_coordinates(const std::string& from_crs, const std::string& to_crs,
-                             const MapPoint& point) {
-  const ContextPtr context = make_context();
-  const PjPtr from = horizontal_crs(context.get(), from_crs);
-  const PjPtr to = horizontal_crs(context.get(), to_crs);
+struct CoordinateConversion::Impl {
+  ContextPtr context;
+  PjPtr conversion;  // null where there is no way from one to the other
+
+  std::optional<MapPoint> convert(const MapPoint& point, PJ_DIRECTION direction) const {
+    const PJ_COORD at = conversion ? proj_trans(conversion.get(), direction,
+                                                proj_coord(point.x, point.y, 0, HUGE_VAL))
+                                   : proj_coord(HUGE_VAL, HUGE_VAL, 0, 0);
+    if (!std::isfinite(at.xy.x) || !std::isfinite(at.xy.y)) return {};
+    return MapPoint{at.xy.x, at.xy.y, point.height_m};
+  }
+};
+
+CoordinateConversion::CoordinateConversion(const std::string& from_crs, const std::string& to_crs)
+    : impl_(std::make_unique<Impl>()) {
+  impl_->context = make_context();
+  PJ_CONTEXT* context = impl_->context.get();
+  const PjPtr from = horizontal_crs(context, from_crs);
+  const PjPtr to = horizontal_crs(context, to_crs);
   if (!from || !to)
     throw Error(ErrorCode::kInput,
                 fmt::format("coordinate system '{}': not known; a name such as OGC:CRS84 or "
                             "EPSG:32611, or WKT, was expected",
                             (from ? to_crs : from_crs).substr(0, 60)));
   const PjPtr conversion(
-      proj_create_crs_to_crs_from_pj(context.get(), from.get(), to.get(), nullptr, nullptr));
-  const PjPtr ordered(conversion ? proj_normalize_for_visualization(context.get(), conversion.get())
-                                 : nullptr);
-  const PJ_COORD at =
-      ordered ? proj_trans(ordered.get(), PJ_FWD, proj_coord(point.x, point.y, 0, HUGE_VAL))
-              : proj_coord(HUGE_VAL, HUGE_VAL, 0, 0);
-  if (!std::isfinite(at.xy.x) || !std::isfinite(at.xy.y))
+      proj_create_crs_to_crs_from_pj(context, from.get(), to.get(), nullptr, nullptr));
+  if (conversion)
+    impl_->conversion.reset(proj_normalize_for_visualization(context, conversion.get()));
+}
+
+CoordinateConversion::~CoordinateConversion() = default;
+CoordinateConversion::CoordinateConversion(CoordinateConversion&&) noexcept = default;
+
+std::optional<MapPoint> CoordinateConversion::forwards(const MapPoint& point) const {
+  return impl_->convert(point, PJ_FWD);
+}
+
+std::optional<MapPoint> CoordinateConversion::back(const MapPoint& point) const {
+  return impl_->convert(point, PJ_INV);
+}
+
+MapPoint convert_coordinates(const std::string& from_crs, const std::string& to_crs,
+                             const MapPoint& point) {
+  const auto converted = CoordinateConversion(from_crs, to_crs).forwards(point);
+  if (!converted)
     throw Error(
         ErrorCode::kInput,
         fmt::format("position {:.10g},{:.10g}: cannot be converted to the coordinate system "
                     "of the data; check the order (x,y) and --crs",
                     point.x, point.y));
-  return {at.xy.x, at.xy.y, point.height_m};
+  return *converted;
 }
 
 }  // namespace scarp

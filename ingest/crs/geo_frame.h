@@ -98,8 +98,27 @@ class GeoFrame {
   std::unique_ptr<Datum> datum_;  // ellipsoidal frames
 };
 
-/// Converts map coordinates between two CRSs (any text that PROJ understands, such as
-/// "OGC:CRS84"), in the order x (east, longitude), y. Throws Error{kInput}.
+/// Conversion of map coordinates between two CRSs (any text that PROJ understands, such as
+/// "OGC:CRS84"), in the order x (east, longitude), y, with the change of datum between them.
+/// Heights are left alone. For one thread at a time, because PROJ's objects belong to one; to make
+/// one takes a millisecond, to use it a microsecond.
+class CoordinateConversion {
+ public:
+  /// Throws Error{kInput} where a CRS is not known.
+  CoordinateConversion(const std::string& from_crs, const std::string& to_crs);
+  ~CoordinateConversion();
+  CoordinateConversion(CoordinateConversion&&) noexcept;
+
+  /// Nothing where a point has no place in the other CRS.
+  std::optional<MapPoint> forwards(const MapPoint& point) const;
+  std::optional<MapPoint> back(const MapPoint& point) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// One point. Throws Error{kInput}.
 MapPoint convert_coordinates(const std::string& from_crs, const std::string& to_crs,
                              const MapPoint& point);
 

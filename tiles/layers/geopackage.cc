@@ -3,6 +3,7 @@
 #include <cpl_string.h>
 #include <gdal_alg.h>
 #include <gdal_priv.h>
+#include <gdal_utils.h>
 #include <ogrsf_frmts.h>
 
 #include <algorithm>
@@ -115,14 +116,15 @@ GDALDatasetUniquePtr raster_in_memory(const RasterLayer& raster, const GdalSessi
 void outline_areas(GDALDataset& dataset, const RasterLayer& raster, const std::string& field,
                    OGRSpatialReference* crs, const GdalSession& session, const std::string& path) {
   const GDALDatasetUniquePtr values = raster_in_memory(raster, session, path);
-  if (dataset.StartTransaction() != OGRERR_NONE) session.fail(path);
+  const bool in_one_go = dataset.TestCapability(ODsCTransactions);
+  if (in_one_go && dataset.StartTransaction() != OGRERR_NONE) session.fail(path);
   OGRLayer* layer = dataset.CreateLayer("areas", crs, wkbPolygon, nullptr);
   if (layer == nullptr) session.fail(path);
   OGRFieldDefn definition(field.c_str(), OFTInteger64);
   if (layer->CreateField(&definition) != OGRERR_NONE ||
       GDALPolygonize(values->GetRasterBand(1), values->GetRasterBand(2), OGRLayer::ToHandle(layer),
                      0, nullptr, nullptr, nullptr) != CE_None ||
-      dataset.CommitTransaction() != OGRERR_NONE)
+      (in_one_go && dataset.CommitTransaction() != OGRERR_NONE))
     session.fail(path);
 }
 
@@ -166,6 +168,36 @@ void write_area_polygons(const std::string& path, const RasterLayer& layer,
                    [&](GDALDataset& dataset, OGRSpatialReference* crs, const GdalSession& session) {
                      outline_areas(dataset, layer, field, crs, session, path);
                    });
+}
+
+std::string area_polygons_geojson(const RasterLayer& layer, const std::string& field) {
+  assert(!std::holds_alternative<std::span<const float>>(layer.samples));
+  assert(!layer.crs_wkt.empty());
+  const std::string name = "areas.geojson";
+  const GdalSession session;
+  GDALDriver* driver = GetGDALDriverManager()->GetDriverByName("Memory");
+  if (driver == nullptr) session.fail(name);
+  GDALDatasetUniquePtr outlined(driver->Create("", 0, 0, 0, GDT_Unknown, nullptr));
+  if (!outlined) session.fail(name);
+  OGRSpatialReference crs = spatial_reference(layer.crs_wkt, name);
+  outline_areas(*outlined, layer, field, &crs, session, name);
+  CPLStringList arguments;
+  for (const char* argument : {"-f", "GeoJSON", "-lco", "RFC7946=YES", "-lco",
+                               "COORDINATE_PRECISION=7", "-lco", "WRITE_NAME=NO"})
+    arguments.AddString(argument);
+  const std::unique_ptr<GDALVectorTranslateOptions, decltype(&GDALVectorTranslateOptionsFree)>
+      options(GDALVectorTranslateOptionsNew(arguments.List(), nullptr),
+              &GDALVectorTranslateOptionsFree);
+  const std::string built = session.folder() + "/" + name;
+  GDALDatasetH source = GDALDataset::ToHandle(outlined.get());
+  int misuse = 0;
+  GDALDatasetH written =
+      GDALVectorTranslate(built.c_str(), nullptr, 1, &source, options.get(), &misuse);
+  if (written == nullptr) session.fail(name);
+  GDALClose(written);  // closing writes the rest
+  session.check(name);
+  const std::span<const std::byte> bytes = session.bytes_of(built, name);
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 }  // namespace scarp

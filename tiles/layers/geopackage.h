@@ -52,4 +52,9 @@ void write_group_polygons(const std::string& path, std::span<const GroupPolygon>
 void write_area_polygons(const std::string& path, const RasterLayer& layer,
                          const std::string& field, Existing existing);
 
+/// The same outlines as a GeoJSON text (RFC 7946): in longitude and latitude, 7 digits.
+/// Requires (asserted) besides a layer with a CRS. Errors: kResource with GDAL's own words, kInput
+/// where the CRS is not WKT.
+std::string area_polygons_geojson(const RasterLayer& layer, const std::string& field);
+
 }  // namespace scarp
