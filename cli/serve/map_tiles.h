@@ -28,6 +28,12 @@ std::string terrain_rgb_tile(const ServedScene& scene, const MapTile& tile);
 /// Groups of a scene, each in a colour of its own, borders darker. Requires a scene.
 std::string groups_tile(const ServedScene& scene, const MapTile& tile);
 
+/// The numbers of the groups as 65536 R + 256 G + B, for clients that paint them themselves; ground
+/// without a group has kNoGroupNumber, and what is void or outside is transparent. Requires a
+/// scene.
+inline constexpr std::uint32_t kNoGroupNumber = 0xFFFFFF;
+std::string group_numbers_tile(const ServedScene& scene, const MapTile& tile);
+
 /// What eyes see: see SeenColours.
 std::string seen_tile(const ServedScene& scene, const EyesRaster& seen, const MapTile& tile);
 
