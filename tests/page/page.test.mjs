@@ -196,7 +196,6 @@ describe('the page', {skip: reason}, () => {
 
   it('shows what a camera culls', async () => {
     await with_page(async (page) => {
-      await page.waitForTimeout(100);
       await page.click('#tab-camera');
       const box = await page.locator('#map').boundingBox();
       await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
@@ -204,10 +203,18 @@ describe('the page', {skip: reason}, () => {
       const culled = Number(await page.locator('#map').evaluate((map) => map.dataset.culled));
       const judged = JSON.parse(await run_command(page));
       assert.match(await page.locator('#camera-answer').textContent(), new RegExp(`${culled.toLocaleString('en')} hidden by ground`));
-      assert.equal(culled, judged.groups_hidden ?? judged.groups?.hidden ?? culled);
+      assert.equal(culled, judged.groups - judged.visible_groups.length);
       assert.ok(culled > 0);
+      // In their two colours, on the map.
       await idle(page);
-    }, {hash: '#scene=part'});
+      const {data} = await picture(page);
+      const count = {drawn: 0, culled: 0};
+      for (let i = 0; i < data.length; i += 4) {
+        if (data[i + 1] > data[i] + 25) ++count.drawn;
+        if (data[i] > data[i + 1] + 45) ++count.culled;
+      }
+      assert.ok(count.drawn > 1000 && count.culled > 1000, JSON.stringify(count));
+    }, {hash: '#scene=part&show=none'});
   });
 
   it('says in words what went wrong, and goes on', async () => {
