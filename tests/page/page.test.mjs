@@ -65,7 +65,7 @@ describe('the page', {skip: reason}, () => {
       await wait_shown(page);
       await idle(page);
       const seen = await picture(page);
-      assert.match(await page.locator('#viewshed-answer').textContent(), /Eye A sees [\d.,]+ km².*of the ground within 15\.00 km · \d+ ms/);
+      assert.match(await page.locator('#viewshed-answer').textContent(), /Eye A sees [\d.,]+ km².*of the scene, looking 15\.00 km far · \d+ ms/);
 
       await run_command(page);
       const raster = read_raster(join(folder, 'seen.tif'), folder);

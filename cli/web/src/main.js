@@ -226,6 +226,7 @@ function bind_panel() {
     $('fold').setAttribute('aria-label', folded ? 'Unfold the controls' : 'Fold the controls');
   });
   $('help-open').addEventListener('click', () => $('help').showModal());
+  $('help-close').addEventListener('click', () => $('help').close());
   $('problem').lastElementChild.addEventListener('click', page.calm);
   const copy = async (text, what) => {
     try {

@@ -242,7 +242,7 @@ export class ViewshedTool {
     const who = state.eyes.length === 1 ? this.#title(state.eyes[0], 0) : plural(state.eyes.length, 'eye');
     $('viewshed-answer').replaceChildren(
       `${who} ${state.eyes.length === 1 ? 'sees' : 'see'} `, element('b', {textContent: area(seen * cell_m2)}),
-      element('small', {textContent: `${share(seen, known)} of the ground within ${distance(state.radius_m)} · ${Math.round(took_ms)} ms`}));
+      element('small', {textContent: `${share(seen, known)} of the scene, looking ${distance(state.radius_m)} far · ${Math.round(took_ms)} ms`}));
   }
 
   async #download(type, suffix) {
