@@ -63,8 +63,13 @@ describe('the page', {skip: reason}, () => {
       const bare = await picture(page);
       await right_click(page, EYE);
       await wait_shown(page);
+      const at_once = await picture(page);
       await idle(page);
       const seen = await picture(page);
+      // When the page says that it is there, it is there.
+      let late = 0;
+      for (let i = 0; i < seen.data.length; i += 4) late += Math.abs(at_once.data[i] - seen.data[i]) > 6;
+      assert.ok(late < 0.002 * seen.data.length / 4, `${late} pixels came later`);
       assert.match(await page.locator('#viewshed-answer').textContent(), /Eye A sees [\d.,]+ km².*of the scene, looking 15\.00 km far · \d+ ms/);
 
       await run_command(page);
