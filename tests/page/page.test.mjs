@@ -126,7 +126,7 @@ describe('the page', {skip: reason}, () => {
       assert.ok(await shown(page) > before + 1, 'nothing was shown on the way');
       await page.mouse.up();
       const end = await page.locator('#eyes .where').inputValue();
-      await page.waitForFunction((at) => document.getElementById('map').dataset.eyes === at.replace(' ', ''), end, {timeout: 30_000});
+      await page.waitForFunction((at) => document.getElementById('map').dataset.eyes === at.replace(' ', ''), end);
       const [lon, lat] = end.split(',').map(Number);
       assert.ok(lon > EYE.lon && lat > EYE.lat);
     });

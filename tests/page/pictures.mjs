@@ -15,7 +15,7 @@ const browser = await launch();
 const into = (name) => join(REPOSITORY, 'docs/pictures', `page-${name}.png`);
 
 async function picture(name, hash, act, options) {
-  const {page, close} = await open_page(browser, server.address, {hash, ...options});
+  const {page, close} = await open_page(browser, server.address, {hash, viewport: {width: 1280, height: 800}, ...options});
   await act(page);
   await idle(page);
   await page.waitForTimeout(300);
