@@ -53,6 +53,7 @@ describe('the page', {skip: reason}, () => {
     await file.saveAs(path);
     return path;
   }
+  const middle = (page) => page.evaluate(() => document.getElementById('map').map.getCenter());
   const picture = async (page) => PNG.sync.read(await page.screenshot());
 
   it('answers a right click with the viewshed that the command line has', async () => {
@@ -275,8 +276,12 @@ describe('the page', {skip: reason}, () => {
       await page.keyboard.press('2');
       await page.keyboard.press('m');
       await page.keyboard.press('Enter');
-      for (let i = 0; i < 3; ++i) await page.keyboard.press('ArrowRight');
-      await idle(page);
+      const west = (await middle(page)).lng;
+      await page.keyboard.press('ArrowRight');
+      await page.waitForFunction((before) => {
+        const {map} = document.getElementById('map');
+        return !map.isMoving() && map.getCenter().lng > before;
+      }, west);
       await page.keyboard.press('Enter');
       await wait_data(page, 'sight');
       // Tabs with arrows, help with ? and Escape.
@@ -305,10 +310,10 @@ describe('the page', {skip: reason}, () => {
       await page.waitForFunction(() => location.hash.includes('target=10'));
       const params = (text) => Object.fromEntries(text.slice(1).split('&').map((part) => part.split('=')).filter(([key]) => !['view', 'eye'].includes(key)));
       assert.deepEqual(params(await page.evaluate(() => location.hash)), {...params(hash), target: '10'});
-      const again = await shown(page);
-      await page.evaluate(() => (location.hash = location.hash.replace('target=10', 'target=0')));
-      await wait_shown(page, again);
-      assert.equal(await page.locator('#target-height').inputValue(), '0');
+      // An address that is changed is followed.
+      await page.evaluate(() => (location.hash = location.hash.replace('target=10', 'target=0').replace(',Mast', ',Pole')));
+      await page.waitForFunction(() => document.getElementById('target-height').value === '0');
+      assert.equal(await page.locator('#eyes .called').last().inputValue(), 'Pole');
     }, {hash});
   });
 

@@ -12,14 +12,14 @@ run(PROGRAM, ['build', 'tujunga.tif', '-o', 'tujunga.scene', '--max-error', '10'
 run('ln', ['-s', dem, join(folder, 'big-tujunga.tif')]);
 const server = await serve(['big-tujunga.tif', 'tujunga.scene'], {cwd: folder});
 const browser = await launch();
-const into = (name) => join(REPOSITORY, 'docs/pictures', `page-${name}.png`);
+const into = (name) => join(REPOSITORY, 'docs/pictures', `page-${name}.jpg`);
 
 async function picture(name, hash, act, options) {
   const {page, close} = await open_page(browser, server.address, {hash, viewport: {width: 1280, height: 800}, ...options});
   await act(page);
   await idle(page);
   await page.waitForTimeout(300);
-  await page.screenshot({path: into(name)});
+  await page.screenshot({path: into(name), type: 'jpeg', quality: 80});
   await close();
 }
 

@@ -15,8 +15,10 @@ export function element(tag, {data = {}, aria = {}, ...properties} = {}, ...chil
  *  @param scale  of what is shown: 0.001 shows metres as kilometres
  *  @param empty  what an empty field means; undefined: empty is wrong */
 export function bind_number(input, store, key, {scale = 1, empty} = {}) {
+  const read = () => (input.value === '' ? empty : Number((Number(input.value) / scale).toPrecision(12)));
   const show = (value) => {
-    if (document.activeElement !== input) input.value = value === null ? '' : String(Number((value * scale).toPrecision(12)));
+    // What means the same stays as it is being typed.
+    if (document.activeElement !== input || read() !== value) input.value = value === null ? '' : String(Number((value * scale).toPrecision(12)));
   };
   show(store.state[key]);
   store.on([key], (state) => show(state[key]));
@@ -24,7 +26,7 @@ export function bind_number(input, store, key, {scale = 1, empty} = {}) {
     const left_out = input.value === '' && !input.validity.badInput && empty !== undefined;
     const good = left_out || (input.value !== '' && input.validity.valid);
     input.setAttribute('aria-invalid', String(!good));
-    if (good) store.set({[key]: left_out ? empty : Number((Number(input.value) / scale).toPrecision(12))});
+    if (good) store.set({[key]: read()});
   });
   input.addEventListener('blur', () => {
     input.setAttribute('aria-invalid', 'false');

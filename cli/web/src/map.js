@@ -6,7 +6,6 @@ import {tile_json} from './api.js';
 import {CulledTiles} from './culled_tiles.js';
 import {ink, dark} from './theme.js';
 
-const CANVAS_SIDE = 2;
 const calm = () => matchMedia('(prefers-reduced-motion: reduce)').matches;
 
 const feature = (coordinates, properties = {}, type = 'LineString') => ({
@@ -22,7 +21,6 @@ export class MapView {
     this.element = element;
     this.layers = new Set();
     this.culled = new CulledTiles();
-    this.picture = Object.assign(document.createElement('canvas'), {width: CANVAS_SIDE, height: CANVAS_SIDE});
     const {view} = store.state;
     this.map = new maplibregl.Map({
       container: element,
@@ -77,7 +75,7 @@ export class MapView {
         groups: {type: 'raster', ...tiles(groups)},
         culled: {type: 'raster', ...tiles(ids), tiles: [this.culled.over(absolute(ids.tiles[0]))]},
       }),
-      picture: {type: 'canvas', canvas: this.picture, animate: false, coordinates: corners([w, s, e, n])},
+      picture: {type: 'canvas', canvas: Object.assign(document.createElement('canvas'), {width: 2, height: 2}), animate: false, coordinates: corners([w, s, e, n])},
       limits: empty, sight: empty, horizon: empty, camera: empty, edge: {...empty, data: feature(frame)},
       // Beyond the scene tiles have heights that mean nothing.
       beyond: {...empty, data: feature([[[-180, -85], [180, -85], [180, 85], [-180, 85], [-180, -85]], [...frame].reverse()], {}, 'Polygon')},
@@ -147,23 +145,19 @@ export class MapView {
   /** The picture of an answer; called back when it is on the screen.
    *  @param bounds  [w, s, e, n] degrees of its edges */
   show_picture(bitmap, bounds, shown) {
-    const {picture} = this;
-    if (picture.width !== bitmap.width) picture.width = bitmap.width;
-    if (picture.height !== bitmap.height) picture.height = bitmap.height;
-    const context = picture.getContext('2d');
-    context.clearRect(0, 0, picture.width, picture.height);
-    context.drawImage(bitmap, 0, 0);
-    bitmap.close();
     const source = this.map.getSource('picture');
+    // As it is, without the way over a canvas, which would be read back. A width that is not the
+    // source's own makes it upload, once; play() would do so in every frame.
+    const before = source.canvas;
+    source.canvas = bitmap;
+    source.width = 0;
     source.setCoordinates(corners(bounds));
+    before.close?.();
     this.map.setLayoutProperty('picture', 'visibility', 'visible');
-    source.play();
     // Ground in 3D keeps what was painted on it until a style changes.
     if (this.map.getTerrain()) this.map.setPaintProperty('picture', 'raster-opacity', (this.odd = !this.odd) ? 1 : 0.9999);
-    this.map.once('render', () => {
-      source.pause();
-      requestAnimationFrame(() => shown?.());
-    });
+    this.map.triggerRepaint();
+    this.map.once('render', () => requestAnimationFrame(() => shown?.()));
   }
 
   hide_picture() {

@@ -41,7 +41,7 @@ export class ViewshedTool {
     store.on(['eyes', 'chosen'], () => this.#list());
     store.on(['eyes', 'tool', 'chosen'], () => this.#mark());
     store.on(QUESTION, () => this.ask());
-    store.on(['eyes', 'radius_m', 'azimuth_deg'], () => this.#limits());
+    store.on(['radius_m', 'azimuth_deg'], () => this.#limits(store.state));
   }
 
   /** All anew: after another scene or address. */
@@ -51,7 +51,7 @@ export class ViewshedTool {
     $('refraction').placeholder = String(scene.refraction ?? 0);
     this.#list();
     this.#mark();
-    this.#limits();
+    this.#limits(this.page.store.state);
     this.ask();
   }
 
@@ -176,8 +176,8 @@ export class ViewshedTool {
     });
   }
 
-  #limits() {
-    const {eyes, radius_m, azimuth_deg} = this.page.store.state;
+  /** Around the eyes that the picture is of: a line for each place of a drag would cost a frame. */
+  #limits({eyes, radius_m, azimuth_deg}) {
     this.page.map.draw_limits(eyes, radius_m, azimuth_deg);
   }
 
@@ -188,6 +188,7 @@ export class ViewshedTool {
     if (!state.eyes.length) {
       this.#newest.stop();
       this.page.map.hide_picture();
+      this.#limits(state);
       $('viewshed-answer').textContent = '';
       $('legend').hidden = true;
       return;
@@ -219,10 +220,11 @@ export class ViewshedTool {
   }
 
   async #show(state, headers, blob, asked_at) {
-    const bitmap = await createImageBitmap(blob);
+    const bitmap = await createImageBitmap(blob, {colorSpaceConversion: 'none'});
     if (this.page.store.state.scene !== state.scene || !this.page.store.state.eyes.length) return bitmap.close();
     this.page.calm();
     const bounds = headers.get('X-Scarp-Bounds').split(',').map(Number);
+    this.#limits(state);
     this.page.map.show_picture(bitmap, bounds, () => {
       const measure = performance.measure('viewshed', {start: asked_at, end: performance.now()});
       const box = this.page.map.element;
