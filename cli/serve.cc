@@ -43,6 +43,7 @@ int run_serve(const ServeOptions& options) {
   server.stop_on_signals(patience, [&api] { api.close(); });
   print_begun(options, api, server);
   server.run();
+  api.finish();
   return 0;
 }
 

@@ -8,6 +8,7 @@
 #include "cli/loaded_scene.h"
 #include "core/error/error.h"
 #include "core/threads/parallel_for.h"
+#include "core/threads/stop.h"
 #include "core/viewshed/seen_ground.h"
 #include "core/viewshed/tin_viewshed.h"
 #include "ingest/dem/ground_placement.h"
@@ -175,7 +176,12 @@ std::vector<GroupIndex> ViewSource::group_of_samples() const {
 }
 
 std::uint64_t ViewSource::known_samples() const {
-  std::call_once(known_once_, [&] { known_ = count_known(samples()); });
+  std::call_once(known_once_, [&] {
+    // Kept for all who ask, so it is counted to its end whoever asks first.
+    const StopAsked never;
+    const StopScope scope(never);
+    known_ = count_known(samples());
+  });
   return known_;
 }
 

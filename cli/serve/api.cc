@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "cli/serve/json_schema.h"
+#include "cli/serve/negotiation.h"
 #include "cli/serve/problem.h"
 #include "core/error/error.h"
 #include "core/threads/parallel_for.h"
@@ -132,7 +133,7 @@ Api::Api(const ServeOptions& options)
 }
 
 Api::~Api() {
-  close();
+  finish();
 }
 
 void Api::close() {
@@ -140,6 +141,12 @@ void Api::close() {
   for (const auto& job : jobs_.all()) job->dismiss();
   if (pool_) pool_->close();
   if (job_pool_) job_pool_->close();
+}
+
+void Api::finish() {
+  close();
+  pool_.reset();
+  job_pool_.reset();
 }
 
 void Api::add(Route route) {
@@ -230,7 +237,7 @@ HttpResponse Api::finished(HttpResponse response, const Call& call) const {
   const std::string_view wanted = call.request->header("if-none-match");
   if (response.status == 200 && !wanted.empty())
     for (const auto& [name, value] : response.headers)
-      if (name == "ETag" && value == wanted) {
+      if (name == "ETag" && matches_etag(wanted, value)) {
         response.status = 304;
         response.body.reset();
         break;

@@ -59,6 +59,9 @@ class Api {
   void handle(std::shared_ptr<const HttpRequest> request, Reply reply);
   /// What waits for its turn is answered by 503, jobs are dismissed; what runs goes on.
   void close();
+  /// After close() and once no request comes any more: waits for what runs. Its replies go to a
+  /// server that must be there still.
+  void finish();
 
   void watch(const HttpServer& server) { server_ = &server; }
   const ServedScenes& scenes() const { return *scenes_; }

@@ -108,6 +108,9 @@ nlohmann::json Job::status_info(const std::string& origin) const {
       {"processID", process_},
       {"type", "process"},
       {"jobID", id_},
+      // What the draft of the standard's second version calls them.
+      {"id", id_},
+      {"processingEntityType", "ogc-api-processes"},
       {"status", name_of(status_)},
       {"created", moment(created_)},
       {"updated", moment(updated_)},

@@ -272,7 +272,7 @@ std::string hillshade_tile(const ServedScene& scene, const MapTile& tile) {
     const std::array<float, 3> tint = relief_colour((height_m - lowest_m) / range_m);
     for (std::size_t k = 0; k < 3; ++k)
       pixels[4 * i + k] =
-          static_cast<std::uint8_t>(std::clamp(tint[k] * (0.25F + 0.75F * light), 0.0F, 255.0F));
+          static_cast<std::uint8_t>(std::clamp(tint[k] * (0.4F + 0.6F * light), 0.0F, 255.0F));
     pixels[4 * i + 3] = 255;
   }
   return encode_png(kTilePx, kTilePx, 4, pixels);

@@ -10,7 +10,7 @@
 #include "cli/outputs.h"
 #include "cli/serve/request_target.h"
 #include "core/error/error.h"
-#include "core/threads/parallel_for.h"
+#include "core/threads/stop.h"
 
 namespace scarp {
 namespace {
@@ -102,6 +102,9 @@ std::shared_ptr<const ViewSource> ServedScene::source(std::optional<double> refr
   if (found != frames_.end()) {
     frames_.splice(frames_.begin(), frames_, found);
   } else {
+    // Others will use it as well: no matter who leaves meanwhile, it is read to its end.
+    const StopAsked never;
+    const StopScope scope(never);
     DemOptions options = dem_options_;
     options.refraction = *refraction;
     frames_.emplace_front(*refraction,
@@ -175,7 +178,11 @@ std::optional<double> ServedScene::ground_m(const LonLat& at) const {
 }
 
 const std::vector<std::uint32_t>& ServedScene::group_of_samples() const {
-  std::call_once(groups_once_, [&] { group_of_samples_ = source_->group_of_samples(); });
+  std::call_once(groups_once_, [&] {
+    const StopAsked never;
+    const StopScope scope(never);
+    group_of_samples_ = source_->group_of_samples();
+  });
   return group_of_samples_;
 }
 
