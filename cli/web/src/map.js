@@ -113,7 +113,9 @@ export class MapView {
     const paint = (layer, key, value) => this.layers.has(layer) && this.map.setPaintProperty(layer, key, value);
     paint('paper', 'background-color', ink('--paper'));
     paint('beyond', 'fill-color', ink('--paper'));
-    paint('hillshade', 'raster-brightness-max', dark() ? 0.62 : 1);
+    // Quiet enough for a viewshed's amber over it.
+    paint('hillshade', 'raster-brightness-min', dark() ? 0 : 0.3);
+    paint('hillshade', 'raster-brightness-max', dark() ? 0.6 : 1);
     paint('edge', 'line-color', ink('--ink'));
     paint('limits', 'line-color', ink('--ink'));
     paint('horizon', 'line-color', ink('--horizon'));
@@ -127,7 +129,7 @@ export class MapView {
   show_layers(state) {
     const show = (layer, on) => this.layers.has(layer) && this.map.setLayoutProperty(layer, 'visibility', on ? 'visible' : 'none');
     // The server's hillshade is tinted by height.
-    if (this.layers.has('hillshade')) this.map.setPaintProperty('hillshade', 'raster-saturation', state.relief ? 0 : -1);
+    if (this.layers.has('hillshade')) this.map.setPaintProperty('hillshade', 'raster-saturation', state.relief ? -0.3 : -1);
     show('groups', state.groups);
     show('culled', state.tool === 'camera' && Boolean(state.camera));
     show('limits', state.tool === 'viewshed');

@@ -87,8 +87,10 @@ export class CameraTool {
     if (!answer) return $('camera-answer').replaceChildren();
     const part = (className, n) => element('i', {className, style: `width:${(100 * n) / total}%`});
     $('camera-bar').replaceChildren(part('seen', visible), part('culled', hidden));
+    const all_around = this.page.store.state.heading_deg === null;
+    const beyond = total - in_view ? ` ${(total - in_view).toLocaleString('en')} more are too far to be asked about.` : '';
     $('camera-answer').replaceChildren(
-      element('b', {textContent: `${share(hidden, in_view)} of what is in view is culled`}),
-      element('small', {textContent: `${plural(visible, 'group')} drawn, ${hidden.toLocaleString('en')} hidden by ground; ${(total - in_view).toLocaleString('en')} of ${total.toLocaleString('en')} not in view.`}));
+      element('b', {textContent: `${share(hidden, in_view)} of the groups are culled`}),
+      element('small', {textContent: `${plural(visible, 'group')} drawn, ${hidden.toLocaleString('en')} hidden by ground${all_around ? '' : ' or out of view'}.${beyond}`}));
   }
 }

@@ -197,7 +197,7 @@ export class ViewshedTool {
   }
 
   async #question(state, signal) {
-    const asked_at = this.#asked_at ?? performance.now();
+    const asked_at = this.#asked_at;
     this.#asked_at = null;
     try {
       const [response, blob] = await this.page.busy(async () => {
@@ -226,15 +226,16 @@ export class ViewshedTool {
     const bounds = headers.get('X-Scarp-Bounds').split(',').map(Number);
     this.#limits(state);
     this.page.map.show_picture(bitmap, bounds, () => {
-      const measure = performance.measure('viewshed', {start: asked_at, end: performance.now()});
+      // From the hand, not from an address that was opened.
+      const took = asked_at === null ? '' : ` · ${Math.round(performance.measure('viewshed', {start: asked_at, end: performance.now()}).duration)} ms`;
       const box = this.page.map.element;
       box.dataset.shown = String(Number(box.dataset.shown ?? 0) + 1);
       box.dataset.eyes = state.eyes.map(({lon, lat}) => `${lon},${lat}`).join(' ');
-      this.#answer(state, headers, measure.duration);
+      this.#answer(state, headers, took);
     });
   }
 
-  #answer(state, headers, took_ms) {
+  #answer(state, headers, took) {
     const entries = legend(state.mode, state.eyes.length);
     $('legend').hidden = !entries.length;
     $('legend').replaceChildren(...entries.map(({colour, text}) => element('li', {}, element('b', {style: `background:${colour}`}), text)));
@@ -244,7 +245,7 @@ export class ViewshedTool {
     const who = state.eyes.length === 1 ? this.#title(state.eyes[0], 0) : plural(state.eyes.length, 'eye');
     $('viewshed-answer').replaceChildren(
       `${who} ${state.eyes.length === 1 ? 'sees' : 'see'} `, element('b', {textContent: area(seen * cell_m2)}),
-      element('small', {textContent: `${share(seen, known)} of the scene, looking ${distance(state.radius_m)} far · ${Math.round(took_ms)} ms`}));
+      element('small', {textContent: `${share(seen, known)} of the scene, looking ${distance(state.radius_m)} far${took}`}));
   }
 
   async #download(type, suffix) {
