@@ -53,7 +53,7 @@ SeenPicture seen_picture(const ServedScene& scene, const EyesRaster& seen);
 /// Colours of values in pictures of what eyes see, red, green, blue, alpha. Mode visible: what is
 /// not seen is transparent. Mode count: by how many of the eyes. Modes ground and dem: by the
 /// height that a target needs, in steps of kHeightSteps_m.
-inline constexpr std::array<std::uint8_t, 4> kSeenColour = {250, 196, 60, 178};
+inline constexpr std::array<std::uint8_t, 4> kSeenColour = {235, 104, 20, 178};
 inline constexpr std::array<float, 7> kHeightSteps_m = {0.5F, 2, 5, 10, 25, 50, 100};
 
 }  // namespace scarp

@@ -438,7 +438,8 @@ TEST_F(ServeApi, FormatsAreNegotiated) {
   EXPECT_EQ(execute("viewshed", named).status, 400);
   json document = body;
   document["response"] = "document";
-  EXPECT_TRUE(json::parse(execute("viewshed", document).body)["viewshed"].contains("href"));
+  EXPECT_TRUE(
+      json::parse(execute("viewshed", document).body)["viewshed"]["value"].contains("href"));
   document["outputs"]["viewshed"]["format"]["mediaType"] = "image/png";
   const json value = json::parse(execute("viewshed", document).body)["viewshed"];
   EXPECT_EQ(value["mediaType"], "image/png");

@@ -6,6 +6,7 @@ import {SHARED, browser_or_reason, serve} from './support/programs.mjs';
 
 const CLICKS = 25;
 const DRAG_S = 5;
+const MOST_MOVES = 3;
 const [dem = join(SHARED, 'projected/bigtujunga_srtm30m_utm11.tif')] = process.argv.slice(2);
 
 const {launch, reason} = browser_or_reason();
@@ -42,12 +43,17 @@ async function drag(page) {
   await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
   await page.mouse.down();
   const [begun, before] = [performance.now(), await shown(page)];
-  let steps = 0;
+  let steps = 0, under_way = 0;
   while (performance.now() - begun < 1000 * DRAG_S) {
     const turn = (performance.now() - begun) / 1000;
-    await page.mouse.move(stage.x + stage.width * (0.5 + 0.2 * Math.cos(turn)), stage.y + stage.height * (0.5 + 0.12 * Math.sin(2 * turn)));
-    ++steps;
-    await page.waitForTimeout(10);
+    // As a hand does, without waiting for what the page makes of it; but not ahead of it either.
+    if (under_way < MOST_MOVES) {
+      ++under_way;
+      ++steps;
+      void page.mouse.move(stage.x + stage.width * (0.5 + 0.2 * Math.cos(turn)), stage.y + stage.height * (0.5 + 0.12 * Math.sin(2 * turn)))
+        .finally(() => --under_way);
+    }
+    await new Promise((done) => setTimeout(done, 8));
   }
   const [after, seconds] = [await shown(page), (performance.now() - begun) / 1000];
   await page.mouse.up();

@@ -39,10 +39,10 @@ describe('bodies', () => {
     const response = await fetch(server.address + path, options);
     return {status: response.status, type: response.headers.get('content-type') ?? '', headers: response.headers, body: await response.json()};
   };
-  const execute = (process, inputs, headers = {}) => get(`/processes/${process}/execution`, {
+  const execute = (process, inputs, headers = {}, more = {}) => get(`/processes/${process}/execution`, {
     method: 'POST',
     headers: {'Content-Type': 'application/json', Accept: 'application/json', ...headers},
-    body: typeof inputs === 'string' ? inputs : JSON.stringify({inputs}),
+    body: typeof inputs === 'string' ? inputs : JSON.stringify({inputs, ...more}),
   });
 
   it('what the page sends is what the server publishes', async () => {
@@ -107,7 +107,7 @@ describe('bodies', () => {
     });
 
     it('jobs, from accepted to dismissed', async () => {
-      const {status, headers, body} = await execute('viewshed', viewshed_inputs(STATES[0]), {Prefer: 'respond-async'});
+      const {status, headers, body} = await execute('viewshed', viewshed_inputs(STATES[0]), {Prefer: 'respond-async'}, {response: 'document'});
       assert.equal(status, 201);
       conforms('statusInfo', renamed(body));
       const job = new URL(headers.get('location'), server.address).pathname;

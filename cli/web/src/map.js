@@ -113,8 +113,8 @@ export class MapView {
     const paint = (layer, key, value) => this.layers.has(layer) && this.map.setPaintProperty(layer, key, value);
     paint('paper', 'background-color', ink('--paper'));
     paint('beyond', 'fill-color', ink('--paper'));
-    // Quiet enough for a viewshed's amber over it.
-    paint('hillshade', 'raster-brightness-min', dark() ? 0 : 0.3);
+    // Quiet enough for a viewshed over it.
+    paint('hillshade', 'raster-brightness-min', dark() ? 0 : 0.2);
     paint('hillshade', 'raster-brightness-max', dark() ? 0.6 : 1);
     paint('edge', 'line-color', ink('--ink'));
     paint('limits', 'line-color', ink('--ink'));
