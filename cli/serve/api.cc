@@ -82,7 +82,9 @@ std::string_view without_port(std::string_view host) {
 
 bool is_this_machine(std::string_view host) {
   const std::string_view name = without_port(host);
-  return name == "localhost" || name == "[::1]" || name.starts_with("127.");
+  // Digits and points only: "127.elsewhere.example" is a name like any other.
+  const bool is_number = name.find_first_not_of("0123456789.") == std::string_view::npos;
+  return name == "localhost" || name == "[::1]" || (is_number && name.starts_with("127."));
 }
 
 bool is_loopback_host(const std::string& host) {

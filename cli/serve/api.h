@@ -86,6 +86,7 @@ class Api {
   nlohmann::json link(const Call& call, const char* rel, const std::string& path,
                       const char* type = "application/json") const;
   nlohmann::json scene_json(const Call& call, const ServedScene& scene) const;
+  nlohmann::json collection_json(const Call& call, const ServedScene& scene) const;
   HttpResponse landing(Call& call) const;
   HttpResponse tile(Call& call, const std::string& layer, const MapTile& at);
   HttpResponse tile_json(Call& call) const;

@@ -67,6 +67,21 @@ json Api::scene_json(const Call& call, const ServedScene& scene) const {
   return description;
 }
 
+json Api::collection_json(const Call& call, const ServedScene& scene) const {
+  const std::string own = "/collections/" + encode_segment(scene.name());
+  const auto& b = scene.bounds();
+  return {
+      {"id", scene.name()},
+      {"title", scene.name()},
+      {"extent",
+       {{"spatial",
+         {{"bbox", json::array({json::array({b[0], b[1], b[2], b[3]})})},
+          {"crs", "http://www.opengis.net/def/crs/OGC/1.3/CRS84"}}}}},
+      {"links",
+       {link(call, "self", own),
+        link(call, "http://www.opengis.net/def/rel/ogc/1.0/tilesets-map", own + "/map/tiles")}}};
+}
+
 void Api::add_scene_routes() {
   const json none = json::object();
   add({"GET", "/scenes", "scenes", "All scenes", none, false, [this](Call& call) {
@@ -150,6 +165,33 @@ void Api::add_tile_routes() {
   add({"GET", "/scenes/{name}/tiles/{layer}/{z}/{x}/{y}.png", "tile",
        "A tile of 256 x 256 pixels in web mercator", optional_view, true,
        [this](Call& call) { return tile(call, call.path["layer"], tile_of(call)); }, "image/png"});
+  add({"GET", "/collections", "collections", "The scenes, as OGC API - Common names them",
+       json::object(), false, [this](Call& call) {
+         json all = json::array();
+         for (const auto& scene : scenes_->all()) all.push_back(collection_json(call, *scene));
+         return json_response(
+             {{"collections", all}, {"links", {link(call, "self", "/collections")}}});
+       }});
+  add({"GET", "/collections/{name}", "collection", "One of them", json::object(), false,
+       [this](Call& call) {
+         return json_response(collection_json(call, scenes_->require(call.path["name"])));
+       }});
+  add({"GET", "/collections/{name}/map/tiles", "tilesets", "Its tilesets: one", json::object(),
+       false, [this](Call& call) {
+         const std::string& name = scenes_->require(call.path["name"]).name();
+         json tileset = {{"title", name},
+                         {"dataType", "map"},
+                         {"crs", "http://www.opengis.net/def/crs/EPSG/0/3857"},
+                         {"tileMatrixSetURI",
+                          "http://www.opengis.net/def/tilematrixset/OGC/1.0/WebMercatorQuad"}};
+         json item = link(call, "item",
+                          "/collections/" + encode_segment(name) +
+                              "/map/tiles/WebMercatorQuad/{tileMatrix}/{tileRow}/{tileCol}",
+                          "image/png");
+         item["templated"] = true;
+         tileset["links"] = json::array({std::move(item)});
+         return json_response({{"tilesets", json::array({std::move(tileset)})}});
+       }});
   for (const char* pattern : {"/collections/{name}/map/tiles/WebMercatorQuad/{z}/{y}/{x}",
                               "/collections/{name}/map/tiles/WebMercatorQuad/{z}/{y}/{x}.png"})
     add({"GET", pattern, std::string(pattern).ends_with("png") ? "map-tile-png" : "map-tile",

@@ -2,9 +2,11 @@
 #include <utility>
 // Order matters.
 #include <fmt/format.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
@@ -156,6 +158,15 @@ std::optional<HttpResponse> answer_to(error_code failure, bool timed_out, const 
   if (failure.category() == make_error_code(http::error::bad_method).category())
     return problem(400, fmt::format("not understood as HTTP/1.1: {}", failure.message()));
   return {};
+}
+
+/// What the system lets the process open, but for some that its files need.
+std::size_t descriptors_for_connections() {
+  constexpr std::size_t kForFiles = 64;
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return kForFiles;
+  return std::max<std::size_t>(kForFiles,
+                               limit.rlim_cur - std::min<std::size_t>(kForFiles, limit.rlim_cur));
 }
 
 }  // namespace
@@ -409,6 +420,7 @@ void HttpServer::Impl::stop_if_done() {
 HttpServer::HttpServer(const std::string& host, std::uint16_t port, const HttpLimits& limits,
                        HttpHandler handler)
     : impl_(std::make_unique<Impl>(limits, std::move(handler))) {
+  impl_->limits.connections = std::min(limits.connections, descriptors_for_connections());
   error_code failure;
   const asio::ip::address address =
       asio::ip::make_address(host == "localhost" ? "127.0.0.1" : host, failure);

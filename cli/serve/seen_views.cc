@@ -105,7 +105,11 @@ std::shared_ptr<const SeenView> SeenViews::look(const ServedScenes& scenes, cons
   const std::size_t samples =
       static_cast<std::size_t>(grid.columns()) * static_cast<std::size_t>(grid.rows());
   const bool is_wide = view->options.mode != ViewshedMode::kVisible;
-  kept_.put(name, view, samples * (is_wide ? 4 : 1));
+  // A view keeps the source that it was seen in, which may be there for its sake only.
+  constexpr std::size_t kSourceBytesPerSample = 5;
+  const bool is_own_source = view->source != scene.source({});
+  kept_.put(name, view,
+            samples * ((is_wide ? 4 : 1) + (is_own_source ? kSourceBytesPerSample : 0)));
   return view;
 }
 

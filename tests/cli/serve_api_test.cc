@@ -329,6 +329,8 @@ TEST_F(ServeApi, TilesAreWhereTheGroundIs) {
   const std::string ogc = "/collections/alps/map/tiles/WebMercatorQuad/12/" +
                           std::to_string(static_cast<int>(fy)) + "/" +
                           std::to_string(static_cast<int>(fx));
+  EXPECT_EQ(get_json("/collections")["collections"][1]["id"], "valley");
+  EXPECT_EQ(get_json("/collections/alps/map/tiles")["tilesets"][0]["dataType"], "map");
   EXPECT_EQ(server_->get(ogc).body, server_->get("/scenes/alps/tiles/hillshade" + at).body);
   for (const char* bad : {"/12/4096/1.png", "/12/-1/1.png", "/99/0/0.png", "/1/0/a.png",
                           "/0/0/0.jpg", "/12/1e3/1.png", "/99999999999999999999/0/0.png"})
@@ -469,7 +471,8 @@ TEST_F(ServeApi, JobsRunToTheirResults) {
   EXPECT_EQ(job_result.status, 200);
   EXPECT_EQ(job_result.body, execute("viewshed", body, "Accept: image/tiff\r\n").body);
   bool listed = false;
-  for (const json& job : get_json("/jobs")["jobs"]) listed |= job["jobID"] == info["jobID"];
+  const json jobs = get_json("/jobs");
+  for (const json& job : jobs["jobs"]) listed |= job["jobID"] == info["jobID"];
   EXPECT_TRUE(listed);
   HttpConnection dismissing(server_->port());
   dismissing.send("DELETE " + place + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
@@ -520,7 +523,9 @@ TEST_F(ServeApi, PublishedSchemasAreThoseThatAreChecked) {
       }
     }
   };
-  for (const json& process : get_json("/processes")["processes"]) {
+  const json processes = get_json("/processes");
+  EXPECT_EQ(processes["processes"].size(), 5U);
+  for (const json& process : processes["processes"]) {
     const json description = get_json("/processes/" + process["id"].get<std::string>());
     visit_schemas(description["inputs"], check);
   }
@@ -577,7 +582,9 @@ TEST_F(ServeApi, ScenesSayWhatTheyAre) {
   EXPECT_EQ(scene["kind"], "scene");
   EXPECT_GT(scene["groups"].get<int>(), 1);
   EXPECT_EQ(get_json("/scenes/valley"), scene);
-  for (const json& file : get_json("/scenes/valley/files")["files"]) {
+  const json files = get_json("/scenes/valley/files");
+  EXPECT_GT(files["files"].size(), 4U);
+  for (const json& file : files["files"]) {
     const std::string href = file["href"];
     EXPECT_EQ(server_->get(href.substr(std::strlen("http://localhost"))).status, 200) << href;
   }

@@ -192,9 +192,11 @@ TEST(ServeHttp, PagesFromElsewhereMayNotAsk) {
                  403);
   EXPECT_EQ(server.post("/processes/echo/execution", "{}", "Origin: http://localhost\r\n").status,
             200);
-  HttpConnection renamed(server.port());
-  renamed.send("GET /scenes HTTP/1.1\r\nHost: evil.example\r\n\r\n");
-  expect_problem(renamed.receive(), 421);
+  for (const char* host : {"evil.example", "127.evil.example", "localhost.evil.example:80"}) {
+    HttpConnection renamed(server.port());
+    renamed.send(std::string("GET /scenes HTTP/1.1\r\nHost: ") + host + "\r\n\r\n");
+    expect_problem(renamed.receive(), 421);
+  }
   HttpConnection text(server.port());
   text.send(
       "POST /processes/echo/execution HTTP/1.1\r\nHost: localhost\r\nContent-Type: "

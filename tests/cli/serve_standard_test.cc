@@ -82,7 +82,9 @@ TEST(ServeStandard, AnswersAreWhatTheStandardSays) {
   expect_fits("landingPage", get("/"));
   expect_fits("confClasses", get("/conformance"));
   expect_fits("processList", get("/processes"));
-  for (const json& process : get("/processes")["processes"])
+  const json processes = get("/processes");
+  EXPECT_EQ(processes["processes"].size(), 5U);
+  for (const json& process : processes["processes"])
     expect_fits("process", get("/processes/" + process["id"].get<std::string>()));
   expect_fits("exception", get("/processes/none"));
   expect_fits("exception", get("/nothing"));

@@ -37,6 +37,7 @@ void take(const std::string& text) {
     const nlohmann::json body = parse_json(text);
     if (!body.is_object() || !body.contains("inputs")) return;
     for (const Process& process : processes()) {
+      if (process.id == "echo") continue;  // promises nothing
       nlohmann::json schema = process.inputs_schema();
       // Any scene: none is served.
       if (schema["properties"].contains("scene")) schema["properties"]["scene"].erase("enum");
