@@ -43,19 +43,21 @@ async function drag(page) {
   await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
   await page.mouse.down();
   const [begun, before] = [performance.now(), await shown(page)];
-  let steps = 0, under_way = 0;
+  const under_way = new Set();
+  let steps = 0;
   while (performance.now() - begun < 1000 * DRAG_S) {
     const turn = (performance.now() - begun) / 1000;
     // As a hand does, without waiting for what the page makes of it; but not ahead of it either.
-    if (under_way < MOST_MOVES) {
-      ++under_way;
+    if (under_way.size < MOST_MOVES) {
       ++steps;
-      void page.mouse.move(stage.x + stage.width * (0.5 + 0.2 * Math.cos(turn)), stage.y + stage.height * (0.5 + 0.12 * Math.sin(2 * turn)))
-        .finally(() => --under_way);
+      const move = page.mouse.move(stage.x + stage.width * (0.5 + 0.2 * Math.cos(turn)), stage.y + stage.height * (0.5 + 0.12 * Math.sin(2 * turn)))
+        .finally(() => under_way.delete(move));
+      under_way.add(move);
     }
     await new Promise((done) => setTimeout(done, 8));
   }
   const [after, seconds] = [await shown(page), (performance.now() - begun) / 1000];
+  await Promise.all(under_way);
   await page.mouse.up();
   return {shown_a_second: (after - before) / seconds, moves_a_second: steps / seconds};
 }
@@ -66,7 +68,7 @@ try {
   const {scenes: [scene]} = await (await fetch(`${server.address}/scenes`)).json();
   const {page} = await open_page(browser, server.address, {hash: '#radius=15000', viewport: {width: 1280, height: 800}});
   const {took, asked} = await clicks(page, scene.bounds);
-  console.log(`${basename(dem)}, cells of ${scene.cell_m} m, 15 km radius, 1280 x 800 pixels, software WebGL`);
+  console.log(`${basename(dem)}, cells of ${scene.cell_m.toFixed(0)} m, 15 km radius, 1280 x 800 pixels, software WebGL`);
   console.log(`first click to pixels   ${took[0].toFixed(0)} ms`);
   console.log(`click to pixels         ${ms(took)}`);
   console.log(`  of which the request  ${ms(asked)}`);
