@@ -125,7 +125,13 @@ class AllHorizonsRun {
                       options_.sources.front()));
   }
 
-  std::size_t bands_per_azimuth() const { return options_.estimate_only ? 1 : 3; }
+  bool has_bounds() const {
+    return !options_.estimate_only && horizon_accuracy(options_.accuracy).has_bounds;
+  }
+  std::size_t bands_per_azimuth() const { return has_bounds() ? 3 : 1; }
+  double tolerance_deg() const {
+    return options_.tolerance_deg.value_or(horizon_accuracy(options_.accuracy).tolerance_deg);
+  }
 
   void check_bands() const {
     const std::size_t bands =
@@ -190,7 +196,7 @@ class AllHorizonsRun {
   SkylineOptions skyline_options(Sight sight) const {
     SkylineOptions look;
     look.eye_height_m = options_.eye_height_m;
-    look.tolerance_rad = options_.tolerance_deg * kRadiansPerDegree;
+    look.tolerance_rad = tolerance_deg() * kRadiansPerDegree;
     look.sight = sight;
     return look;
   }
@@ -350,7 +356,8 @@ class AllHorizonsRun {
       metadata["AZIMUTHS"] = fmt::format("{} from {} north clockwise", azimuths_,
                                          frame.earth == Earth::kFlat ? "grid" : "true");
       metadata["EYE_HEIGHT_M"] = fmt::format("{:g}", options_.eye_height_m);
-      metadata["TOLERANCE_DEG"] = fmt::format("{:g}", options_.tolerance_deg);
+      metadata["TOLERANCE_DEG"] = fmt::format("{:g}", tolerance_deg());
+      metadata["ACCURACY"] = name_of(options_.accuracy);
     }
   }
 
@@ -368,6 +375,7 @@ class AllHorizonsRun {
       result["judged_samples"] = judged_;
     } else {
       result["azimuths"] = azimuths_;
+      result["accuracy"] = name_of(options_.accuracy);
     }
     for (const auto& [name, path] :
          {std::pair("output", options_.output), std::pair("distance", options_.distance_output),

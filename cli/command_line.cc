@@ -49,6 +49,16 @@ void add_surface(CLI::App& command, DemOptions& dem) {
   command.add_option("--nodata", dem.nodata, "A value that stands for void, besides the DEM's own");
 }
 
+/// @param what  high and fast are for the command
+void add_accuracy(CLI::App& command, Accuracy& accuracy, const std::string& what) {
+  command
+      .add_option(
+          "--accuracy", accuracy,
+          "exact, high or fast, where other options leave it open; exact unless given. " + what)
+      ->transform(CLI::CheckedTransformer(std::map<std::string, Accuracy>{
+          {"exact", Accuracy::kExact}, {"high", Accuracy::kHigh}, {"fast", Accuracy::kFast}}));
+}
+
 void add_build(CLI::App& app, BuildOptions& o, std::function<int()>& run) {
   CLI::App* c = app.add_subcommand("build", "Build a scene from one DEM or several");
   c->footer(
@@ -62,6 +72,9 @@ void add_build(CLI::App& app, BuildOptions& o, std::function<int()>& run) {
   auto* error = c->add_option("--max-error", o.max_error_m,
                               "Greatest height error of the mesh over its whole surface, metres; "
                               "a tenth of the cell size unless given");
+  add_accuracy(*c, o.accuracy,
+               "high and fast: meshes of a quarter and a whole cell's error, a half and a quarter "
+               "of the fans; what is culled is certified at each");
   c->add_option("--vertices", o.vertices, "Mesh to this many vertices instead")
       ->excludes(error)
       ->check(CLI::Range(4U, 400'000'000U));
@@ -211,6 +224,9 @@ void add_viewshed(CLI::App& app, ViewshedOptions& o, std::function<int()>& run) 
                                               {"count", ViewshedMode::kCount},
                                               {"ground", ViewshedMode::kGround},
                                               {"dem", ViewshedMode::kDem}}));
+  add_accuracy(*c, o.accuracy,
+               "high: what bounds leave open is guessed between them, and a scene is seen as "
+               "the raster of its heights; fast: so too, with every second sample");
   c->add_option("--obstacles", o.obstacles,
                 "A surface model over the DEM's cells (trees, buildings) that blocks; what is seen "
                 "is the DEM under it");
@@ -264,6 +280,9 @@ void add_all_horizons(CLI::App& command, HorizonOptions& o) {
   command
       .add_option("--eye-height", o.eye_height_m, "All points: metres above ground; 0 unless given")
       ->check(CLI::Range(0.0, 10'000.0));
+  add_accuracy(command, o.accuracy,
+               "All points: high has a --tolerance of 1 degree, fast of 3, and no bounds; a place "
+               "is exact at each");
   command
       .add_option("--tolerance", o.tolerance_deg,
                   "All points: degrees by which a horizon's bounds may differ at most; 0.3 unless "
@@ -354,14 +373,17 @@ void add_verify(CLI::App& app, VerifyOptions& o, std::function<int()>& run) {
 }
 
 void add_compare(CLI::App& app, CompareOptions& o, std::function<int()>& run) {
-  CLI::App* c = app.add_subcommand("compare", "Chart what culling methods cull against their cost");
+  CLI::App* c = app.add_subcommand("compare", "Chart speed against accuracy on your terrain");
   c->footer(
-      "Example:\n  scarp compare alps.scene -o alps-compared --time 5min\n"
-      "Prepares the scene's mesh anew with several settings of each method and judges them from\n"
-      "random eyes. Writes compare.svg and compare.csv into the folder. Settings that would not\n"
-      "fit into the time are left out and named.");
-  c->add_option("scene", o.scene, "A scene")->required();
-  c->add_option("-o,--output", o.output, "A folder for compare.svg and compare.csv")->required();
+      "Examples:\n  scarp compare alps.tif -o alps-compared --time 5min\n"
+      "  scarp compare alps.scene -o alps-compared\n"
+      "Of a DEM, in a square around its middle: viewsheds, least heights, horizons, meshes and\n"
+      "groups, by every method and setting, against the exact judge. Of a scene: its groups,\n"
+      "prepared anew with several settings. Writes compare.html (charts and tables), the charts\n"
+      "as SVG, compare.csv and compare.json. What would not fit into the time is left out and\n"
+      "named.");
+  add_sources(*c, o.sources);
+  c->add_option("-o,--output", o.output, "A new folder")->required();
   c->add_option("--eyes", o.eyes, "Random eyes for each height; 4 unless given")
       ->check(CLI::Range(1, 1'000'000));
   c->add_option("--heights", o.heights_m, "Metres above ground; 2,50,300,1000 unless given")
@@ -379,6 +401,7 @@ void add_compare(CLI::App& app, CompareOptions& o, std::function<int()>& run) {
         o.limit_s = *seconds;
       },
       "What it may take in all; 5min unless given");
+  add_surface(*c, o.dem);
   add_common(*c, o.common);
   c->callback([&] { run = [&o] { return run_compare(o); }; });
 }

@@ -10,6 +10,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "cli/accuracy.h"
 #include "cli/build/layers.h"
 #include "cli/outputs.h"
 #include "core/threads/parallel_for.h"
@@ -24,7 +25,7 @@ double azimuth_rad(double degrees) {
   return (turn < 0 ? turn + 360 : turn) * kRadiansPerDegree;
 }
 
-const char* name_of(ViewshedMode mode) {
+const char* name_of_mode(ViewshedMode mode) {
   switch (mode) {
     case ViewshedMode::kCount:
       return "count";
@@ -86,7 +87,9 @@ RunEye eye_at(const TypedPosition& typed, const ViewshedOptions& options,
 void describe_view(const ViewSource& source, const ViewshedOptions& options,
                    std::span<const RunEye> eyes, std::map<std::string, std::string>& metadata) {
   const FrameDescription& frame = source.dem().frame->description();
-  metadata["MODE"] = options.total ? "total" : name_of(options.mode);
+  // --total says how exact it is by itself.
+  if (!options.total) metadata["ACCURACY"] = name_of(options.accuracy);
+  metadata["MODE"] = options.total ? "total" : name_of_mode(options.mode);
   write_note(note_of(source.surface(), frame), metadata);
   metadata["HEIGHT_UNIT_OF_DEM"] = source.dem().height_unit;
   if (!options.total) {

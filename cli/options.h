@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "cli/accuracy.h"
 #include "ingest/dem/dem.h"
 
 namespace scarp {
@@ -55,6 +56,7 @@ inline constexpr std::int32_t kDefaultTileSamples = 1024;
 
 struct BuildOptions {
   CommonOptions common;
+  Accuracy accuracy = Accuracy::kExact;
   DemOptions dem;
   std::vector<std::string> dem_files;
   std::string scene;
@@ -89,6 +91,7 @@ enum class ViewshedMode { kVisible, kCount, kGround, kDem };
 
 struct ViewshedOptions {
   CommonOptions common;
+  Accuracy accuracy = Accuracy::kExact;
   DemOptions dem;
   std::vector<std::string> sources;    ///< a scene, or DEM files
   std::vector<std::string> obstacles;  ///< a surface model that blocks instead; may be empty
@@ -132,7 +135,8 @@ struct HorizonOptions {
 
   // All points:
   double eye_height_m = 0;
-  double tolerance_deg = 0.3;
+  Accuracy accuracy = Accuracy::kExact;
+  std::optional<double> tolerance_deg;  ///< between bounds; that of the accuracy unless given
   bool estimate_only = false;
   std::string distance_output, sky_view_output, openness_output, negative_openness_output;
   std::optional<double> sun_days;  ///< since 2000-01-01T12:00 UTC
@@ -162,8 +166,9 @@ struct VerifyOptions {
 
 struct CompareOptions {
   CommonOptions common;
-  std::string scene;
-  std::string output;  ///< folder
+  DemOptions dem;
+  std::vector<std::string> sources;  ///< a scene, or DEM files
+  std::string output;                ///< folder
   int eyes = 4;
   std::vector<double> heights_m = {2, 50, 300, 1000};
   std::uint64_t seed = 1;

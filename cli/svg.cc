@@ -5,22 +5,12 @@
 #include <cmath>
 
 namespace scarp {
-namespace {
-
 std::string escaped(const std::string& text) {
   std::string out;
-  for (const char c : text) {
-    if (c == '<')
-      out += "&lt;";
-    else if (c == '&')
-      out += "&amp;";
-    else
-      out += c;
-  }
+  for (const char c : text)
+    out += c == '<' ? "&lt;" : c == '&' ? "&amp;" : c == '"' ? "&quot;" : std::string(1, c);
   return out;
 }
-
-}  // namespace
 
 std::string svg_begin(double width_px, double height_px) {
   return fmt::format(

@@ -8,6 +8,9 @@ namespace scarp {
 inline constexpr char kInkColour[] = "#2b2f36", kFaintColour[] = "#dfe3e8",
                       kSoftColour[] = "#69707a";
 
+/// Text as XML and HTML have it, in quotes too.
+std::string escaped(const std::string& text);
+
 /// The head of a picture and its white ground; "</svg>\n" ends it.
 std::string svg_begin(double width_px, double height_px);
 

@@ -132,11 +132,22 @@ void ViewSource::read_obstacles(const std::vector<std::string>& files, const Dem
   for (const std::string& warning : read.dem.warnings) ground_.dem.warnings.push_back(warning);
 }
 
+void ViewSource::approximate(Accuracy accuracy) {
+  accuracy_ = accuracy;
+  if (accuracy == Accuracy::kExact) return;
+  const GroundGrid& blocks = obstacles_ ? *obstacles_ : samples();
+  if (!tops_) tops_.emplace(blocks, samples());
+  const bool is_small = std::min(samples().columns(), samples().rows()) < ThinnedGround::kFewest;
+  if (accuracy == Accuracy::kFast && !is_small) thinned_.emplace(samples(), blocks);
+}
+
 ViewGround ViewSource::ground() const {
-  if (scene_) return ViewGround::of_tin(samples(), scene_->index);
+  if (scene_ && accuracy_ == Accuracy::kExact) return ViewGround::of_tin(samples(), scene_->index);
   ViewGround ground =
       obstacles_ ? ViewGround::under(samples(), *obstacles_) : ViewGround(samples());
   ground.tops = &*tops_;
+  if (accuracy_ != Accuracy::kExact) ground.deciding = Deciding::kByBounds;
+  if (thinned_) ground.thinned = &*thinned_;
   return ground;
 }
 
@@ -190,6 +201,10 @@ GroundEye ViewSource::place(const TypedPosition& typed, const std::string& crs) 
   GroundEye eye;
   eye.map = resolve(typed, crs, *dem().frame, scene_->index);
   eye.position = GeoFrame::Placer(*dem().frame).place(eye.map);
+  if (accuracy_ != Accuracy::kExact)
+    eye.position =
+        raised_over(eye.position, scene_->index.ground_height_m(eye.position.x_m, eye.position.y_m),
+                    ground_under_m(samples(), eye.position));
   return eye;
 }
 

@@ -41,9 +41,14 @@ class ViewSource {
   const Dem& dem() const { return ground_.dem; }
   /// Its samples, where targets stand.
   const GroundGrid& samples() const { return ground_.grid; }
+  /// Exact until it is approximated.
   ViewGround ground() const;
   /// How many of the samples are known; counted when first asked for. From any thread.
   std::uint64_t known_samples() const;
+  /// From now on ground() is what an accuracy takes for it, and eyes are placed over that: the
+  /// raster of a scene's heights in place of its mesh, bounds in place of exact decisions, and, if
+  /// fast, every second sample.
+  void approximate(Accuracy accuracy);
 
   /// Tiles of a scene, and how many of them were read; 0 of a DEM.
   std::size_t tiles() const { return scene_ ? scene_->tiles.size() : 0; }
@@ -85,6 +90,8 @@ class ViewSource {
   std::optional<GroundTops> tops_;  // of a DEM
   mutable std::once_flag known_once_;
   mutable std::uint64_t known_ = 0;
+  Accuracy accuracy_ = Accuracy::kExact;
+  std::optional<ThinnedGround> thinned_;  // if fast
 };
 
 }  // namespace scarp

@@ -58,6 +58,7 @@ void check_total(const ViewshedOptions& options) {
                        : options.pitch_deg                      ? "--pitch"
                        : !options.polygons.empty()              ? "--polygons"
                        : options.gdal_values                    ? "--gdal-values"
+                       : options.accuracy != Accuracy::kExact   ? "--accuracy"
                        : options.mode != ViewshedMode::kVisible ? "--mode"
                                                                 : nullptr;
   if (single)
@@ -164,6 +165,7 @@ class ViewshedRun {
     if (options_.max_distance_m && options_.observers_file.empty() && !options_.total)
       reach = ViewReach{options_.observers, options_.crs, *options_.max_distance_m};
     source_.emplace(options_.sources, options_.obstacles, dem, progress, reach);
+    source_->approximate(options_.accuracy);
     for (const TypedPosition& typed : options_.observers)
       eyes_.push_back(eye_at(typed, options_, *source_));
     if (!options_.observers_file.empty()) {
@@ -287,6 +289,7 @@ class ViewshedRun {
     } else {
       result = raster_->summary();
     }
+    result["accuracy"] = name_of(options_.accuracy);
     result["output"] = options_.output;
     result["tiles"] = source_->tiles();
     result["tiles_read"] = source_->tiles_read();

@@ -183,7 +183,7 @@ class Planner {
            static_cast<std::uint64_t>(kBytesPerDrawnTriangle * triangles);
   }
   double cost_of_groups(const TileId& tile) const {
-    const int fans = plan_.options.fans.value_or(HidingOptions{}.fans);
+    const int fans = plan_.options.fans.value_or(build_accuracy(plan_.options.accuracy).fans);
     return has_certified(plan_.options.horizon) ? kFanS * fans * kTriangleShare * samples_of(tile)
                                                 : kMeshS * samples_of(tile);
   }
@@ -317,8 +317,8 @@ BuildPlan make_plan(const BuildOptions& options) {
             "it out and ask scarp viewshed, or give --tile-samples {} for one tile",
             std::bit_ceil(static_cast<std::uint32_t>(std::max(dem.columns, dem.rows) - 1))));
   const CellMeasures cells = measure_cells(dem);
-  plan.max_error_m =
-      options.max_error_m.value_or(kDefaultErrorCells * std::min(cells.cell_x_m, cells.cell_y_m));
+  plan.max_error_m = options.max_error_m.value_or(build_accuracy(options.accuracy).error_cells *
+                                                  std::min(cells.cell_x_m, cells.cell_y_m));
   plan.fingerprint = fingerprint_of(plan);
   Planner(plan, source.widest_columns()).run();
   check_memory(plan, options);

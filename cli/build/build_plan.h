@@ -90,9 +90,6 @@ std::string samples_file_name(const TileId& tile);
 std::string occluder_file_name(const TileId& tile);
 std::string group_raster_file_name(const TileId& tile);
 
-/// The error that the mesh is asked for where the user names none: a tenth of the cell size.
-inline constexpr double kDefaultErrorCells = 0.1;
-
 /// The smallest tiles that there may be, cells along a side.
 inline constexpr std::int32_t kLeastTileSamples = 64;
 

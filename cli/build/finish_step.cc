@@ -82,6 +82,7 @@ class Finish {
   RasterLayer groups_layer() const {
     RasterLayer layer = layer_over(source_.dem(), std::span<const std::int32_t>(), "group");
     layer.nodata = kVoidGroupValue;
+    layer.metadata["ACCURACY"] = name_of(plan_.options.accuracy);
     layer.metadata["ORPHAN"] = std::to_string(kOrphanValue);
     return layer;
   }
@@ -219,6 +220,7 @@ class Finish {
   std::map<std::string, ParameterValue> parameters() const {
     const BuildOptions& options = plan_.options;
     std::map<std::string, ParameterValue> parameters = {
+        {"accuracy", name_of(options.accuracy)},
         {"horizon", horizon_name(options.horizon)},
         {"growth", growth_name(options.growth)},
         {"group_triangles", std::int64_t{options.group_triangles}},

@@ -49,7 +49,7 @@ CertifiedSettings settings_for(const BuildPlan& plan, const Groups& groups) {
                           : std::size_t{kMany} * static_cast<std::size_t>(options.group_triangles);
   CertifiedSettings settings;
   settings.sectors = options.sectors.value_or(sectors_within(bytes, triangles, leaves));
-  settings.fans = options.fans.value_or(settings.fans);
+  settings.fans = options.fans.value_or(build_accuracy(options.accuracy).fans);
   settings.patch = options.patch.value_or(settings.patch);
   const double least = least_bytes(leaves) / static_cast<double>(triangles);
   if (options.budget.bytes_per_triangle && bytes < least)

@@ -54,6 +54,7 @@ class Members {
 };
 
 constexpr std::array<const char*, 3> kHorizons = {"certified", "stewart", "both"};
+constexpr std::array<const char*, 3> kAccuracies = {"exact", "high", "fast"};
 constexpr std::array<const char*, 2> kGrowths = {"hidden-together", "breadth-first"};
 constexpr std::array<const char*, 2> kEarths = {"ellipsoid", "flat"};
 static_assert(static_cast<int>(Earth::kEllipsoid) == 0 && static_cast<int>(Earth::kFlat) == 1);
@@ -64,6 +65,7 @@ void visit(Members& members, BuildOptions& options) {
   members.member("geoid", dem.geoid_file);
   members.member("height_unit", dem.height_unit);
   members.member("nodata", dem.nodata);
+  members.word("accuracy", options.accuracy, kAccuracies);
   members.member("max_error_m", options.max_error_m);
   members.member("vertices", options.vertices);
   members.member("footprints", options.footprints_file);

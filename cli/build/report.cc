@@ -139,6 +139,7 @@ json parameters_report(const StepRun& run, const std::optional<MapPoint>& observ
       {"refraction", frame.refraction},
       {"heights", frame.geoid_file.empty() ? "taken as ellipsoidal" : "geoid undulation added"},
       {"height_unit", source["height_unit"]},
+      {"accuracy", name_of(options.accuracy)},
       {"horizon", horizon_name(options.horizon)},
       {"growth", growth_name(options.growth)},
       {"group_triangles", options.group_triangles},

@@ -97,13 +97,6 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text)
-    out += c == '<' ? "&lt;" : c == '&' ? "&amp;" : c == '"' ? "&quot;" : std::string(1, c);
-  return out;
-}
-
 std::string table_of(const Flight& flight, const std::vector<Contender>& contenders) {
   std::string html =
       "<table><tr><th>method</th><th>claims no wrong pixel</th><th>triangles drawn</th>"

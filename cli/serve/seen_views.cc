@@ -28,10 +28,18 @@ ViewshedMode mode_of(const json& inputs) {
                             : ViewshedMode::kVisible;
 }
 
+Accuracy accuracy_of(const json& inputs) {
+  const std::string accuracy = inputs.value("accuracy", "exact");
+  return accuracy == "high"   ? Accuracy::kHigh
+         : accuracy == "fast" ? Accuracy::kFast
+                              : Accuracy::kExact;
+}
+
 ViewshedOptions options_of(const ServedScene& scene, const json& inputs) {
   ViewshedOptions options;
   options.sources = {scene.path()};
   options.mode = mode_of(inputs);
+  options.accuracy = accuracy_of(inputs);
   options.target_height_m = inputs.value("target_height_m", 0.0);
   options.min_distance_m = inputs.value("min_distance_m", 0.0);
   if (inputs.contains("max_distance_m"))
@@ -91,7 +99,7 @@ std::shared_ptr<const SeenView> SeenViews::look(const ServedScenes& scenes, cons
   check_cells(scene, view->options, limits_);
   std::optional<double> refraction;
   if (inputs.contains("refraction")) refraction = inputs["refraction"].get<double>();
-  view->source = scene.source(refraction);
+  view->source = scene.source(refraction, view->options.accuracy);
   std::vector<RunEye> eyes;
   for (const TypedPosition& at : view->options.observers)
     eyes.push_back(eye_at(at, view->options, *view->source));

@@ -89,30 +89,34 @@ void ServedScene::find_bounds() {
                             path_));
 }
 
-std::shared_ptr<const ViewSource> ServedScene::source(std::optional<double> refraction) const {
-  if (!refraction || *refraction == dem_options_.refraction) return source_;
-  if (is_scene_)
+std::shared_ptr<const ViewSource> ServedScene::source(std::optional<double> asked,
+                                                      Accuracy accuracy) const {
+  const double refraction = asked.value_or(dem_options_.refraction);
+  if (is_scene_ && refraction != dem_options_.refraction)
     throw Error(ErrorCode::kInput,
                 fmt::format("refraction {:g}: scene '{}' was built with {:g}, which holds for all "
                             "that is asked of it; leave refraction out, or ask its DEM",
-                            *refraction, name_, dem_options_.refraction));
+                            refraction, name_, dem_options_.refraction));
+  if (refraction == dem_options_.refraction && accuracy == Accuracy::kExact) return source_;
   const std::scoped_lock lock(frames_mutex_);
-  const auto found = std::find_if(frames_.begin(), frames_.end(),
-                                  [&](const auto& frame) { return frame.first == *refraction; });
+  const auto found = std::find_if(frames_.begin(), frames_.end(), [&](const Frame& frame) {
+    return frame.refraction == refraction && frame.accuracy == accuracy;
+  });
   if (found != frames_.end()) {
     frames_.splice(frames_.begin(), frames_, found);
-  } else {
-    // Others will use it as well: no matter who leaves meanwhile, it is read to its end.
-    const StopAsked never;
-    const StopScope scope(never);
-    DemOptions options = dem_options_;
-    options.refraction = *refraction;
-    frames_.emplace_front(*refraction,
-                          std::make_shared<const ViewSource>(
-                              std::vector{path_}, std::vector<std::string>(), options, Progress()));
-    if (frames_.size() > kFrames - 1) frames_.pop_back();
+    return frames_.front().source;
   }
-  return frames_.front().second;
+  // Others will use it as well: no matter who leaves meanwhile, it is read to its end.
+  const StopAsked never;
+  const StopScope scope(never);
+  DemOptions options = is_scene_ ? DemOptions() : dem_options_;
+  if (!is_scene_) options.refraction = refraction;
+  const auto source = std::make_shared<ViewSource>(std::vector{path_}, std::vector<std::string>(),
+                                                   options, Progress());
+  source->approximate(accuracy);
+  frames_.push_front({refraction, accuracy, source});
+  if (frames_.size() > kFrames) frames_.pop_back();
+  return source;
 }
 
 TypedPosition ServedScene::in_data(const TypedPosition& lon_lat) const {

@@ -32,10 +32,12 @@ class ServedScene {
 
   /// The source in its own frame, for maps.
   const ViewSource& source() const { return *source_; }
-  /// The source as rays of this refraction see it: its own, or another one that is read once and
-  /// kept while it is among the last kFrames. Throws Error{kInput} for another one of a scene.
+  /// The source as rays of this refraction see it, and as an accuracy takes it (ViewSource): its
+  /// own, or another one that is read once and kept while it is among the last kFrames. Throws
+  /// Error{kInput} for another refraction of a scene.
   static constexpr std::size_t kFrames = 3;
-  std::shared_ptr<const ViewSource> source(std::optional<double> refraction) const;
+  std::shared_ptr<const ViewSource> source(std::optional<double> refraction,
+                                           Accuracy accuracy = Accuracy::kExact) const;
 
   /// A typed position in lon, lat as one of the CRS of the data. Throws Error{kInput} where it has
   /// no place there.
@@ -72,7 +74,12 @@ class ServedScene {
   std::optional<MercatorMap> map_;
   std::optional<HeightPyramid> heights_;
   mutable std::mutex frames_mutex_;
-  mutable std::list<std::pair<double, std::shared_ptr<const ViewSource>>> frames_;
+  struct Frame {
+    double refraction;
+    Accuracy accuracy;
+    std::shared_ptr<const ViewSource> source;
+  };
+  mutable std::list<Frame> frames_;  // but for the own one; the last asked for first
   mutable std::once_flag groups_once_;
   mutable std::vector<std::uint32_t> group_of_samples_;
 };

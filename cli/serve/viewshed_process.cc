@@ -152,6 +152,11 @@ Process viewshed_process(const ServedScenes& scenes, const ServeLimits& limits) 
             "visible: seen by any eye; count: by how many; ground, dem: least height above "
             "ground, above the datum, at which a target is seen",
             {{"type", "string"}, {"enum", {"visible", "count", "ground", "dem"}}}, false);
+  in["accuracy"] =
+      input("Accuracy",
+            "exact, unless given; high: errs seldom and little; fast: for a first look. Of a scene "
+            "high and fast take its heights as a raster, which is many times faster",
+            {{"type", "string"}, {"enum", {"exact", "high", "fast"}}}, false);
   process.output = "viewshed";
   process.output_schema = {{"type", "object"},
                            {"required", {"visible_cells", "known_cells", "bounds", "href"}},

@@ -117,7 +117,9 @@ SweepCounts sweep_heights(const SweptGround& swept, const Position& eye, const S
                                static_cast<std::size_t>(swept.blocks.rows()));
   if (is_empty(window)) return {};
   const GridSight sight(swept.blocks, eye);
-  const SweepGround ground(sight, SweptGround(swept.blocks, swept.stands), 0, window, true);
+  SweptGround without_tops(swept.blocks, swept.stands);
+  without_tops.deciding = swept.deciding;
+  const SweepGround ground(sight, without_tops, 0, window, true);
   for_window_rows(swept.blocks, window, least_m, [](std::int32_t, std::span<float> values) {
     std::fill(values.begin(), values.end(), std::numeric_limits<float>::quiet_NaN());
   });

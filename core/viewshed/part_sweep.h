@@ -29,12 +29,20 @@ namespace scarp {
 /// the group is passed over without a look at its samples.
 ///
 /// Side of error of the bounds: outwards, by margins derived in sweep_run.h; what they leave open
-/// is decided by exact predicates, so the result has no error.
+/// is decided by exact predicates, so the result has no error, unless Deciding says otherwise.
 /// Requires of the grid what GridSight requires.
 /// Cost: O(1) a sample and bin, about 1.5 bins a sample, of the samples that are not passed over;
 /// O(columns + rows) memory, and for each thread a part's history, of some six bytes a sample.
 /// Threads: all parts on all threads. The same bits for any number of threads.
 /// Source: own; an interval of the horizon in each narrow bin, and exact tracing between.
+
+/// How a sweep decides what its bounds leave open.
+enum class Deciding : std::uint8_t {
+  kExactly,   ///< by exact predicates: no error
+  kByBounds,  ///< seen above a place between the bounds, least heights over the one line that
+              ///< reaches highest; what lies between a target and the line before it is left out.
+              ///< Errs to both sides.
+};
 
 /// What blocks, what targets stand on, and what is known of both.
 struct SweptGround {
@@ -49,6 +57,7 @@ struct SweptGround {
   const GroundGrid& stands;
   const GroundTops* tops = nullptr;  ///< of both; measured anew where it is null
   LeastTops* least_tops = nullptr;   ///< for lower_heights
+  Deciding deciding = Deciding::kExactly;
 };
 
 /// How the samples of a sweep were decided.

@@ -57,6 +57,7 @@ SweepGround::SweepGround(const GridSight& of_sight, const SweptGround& ground, d
       blocks(ground.blocks),
       stands(ground.stands),
       apart(&ground.blocks != &ground.stands),
+      deciding(ground.deciding),
       target_height_m(height_m),
       window(targets) {
   const PlanFrame& frame = sight.frame();

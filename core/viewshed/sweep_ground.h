@@ -16,6 +16,7 @@ struct SweepGround {
   const GroundGrid& blocks;  ///< what blocks
   const GroundGrid& stands;  ///< what targets stand on
   bool apart;                ///< whether these are two
+  Deciding deciding;
   double target_height_m;
   SampleWindow window;  ///< samples outside are no targets, though they block
 

@@ -93,6 +93,22 @@ float SweepRun::climb_in_bin(const Line& line, std::int32_t k, std::size_t bin, 
                       over_columns_ ? line.number : i, over_columns_ ? i : line.number);
 }
 
+/// Deciding::kByBounds: over the line that reaches highest in the bin, but not under what all
+/// directions of the bin have before them.
+float SweepRun::guess_height(const Line& line, std::int32_t k, std::size_t bin) const {
+  const std::int32_t i = line.first + k;
+  const auto [forwards, sideways] = place_of(line, k);
+  double s = low_[bin];
+  const std::int32_t top = top_[bin];
+  if (top >= 0 && std::abs(top - eye_line_) > RayClimb::kLeastLines) {
+    const RayClimb ray(grid_, frame_, sight_.eye().z_m, over_columns_, outwards_, forwards,
+                       sideways);
+    if (const auto slope = ray.slope_at(top)) s = std::max(s, *slope);
+  }
+  return height_up_to(ground_.stands, sight_.eye().z_m + s * forwards,
+                      over_columns_ ? line.number : i, over_columns_ ? i : line.number);
+}
+
 /// Least height over a sample of a line; NaN where that is not known, or where it cannot be less
 /// than enough_m.
 float SweepRun::climb_to(const Line& line, const Line* before, std::int32_t k, float enough_m) {
@@ -107,7 +123,9 @@ float SweepRun::climb_to(const Line& line, const Line* before, std::int32_t k, f
     if (is_enough(sight_.eye().z_m + s * place_of(line, k).first, line, k, enough_m))
       return std::numeric_limits<float>::quiet_NaN();
   }
-  if (some_void_[bin] || (before && crosses_before(*before, i, line.t[n])))
+  const bool guesses = ground_.deciding == Deciding::kByBounds;
+  if (guesses && some_void_[bin]) return std::numeric_limits<float>::quiet_NaN();
+  if (some_void_[bin] || (!guesses && before && crosses_before(*before, i, line.t[n])))
     return climb_all(line.number, i);
   float s = line.s[n];
   if (ground_.apart) {
@@ -115,6 +133,7 @@ float SweepRun::climb_to(const Line& line, const Line* before, std::int32_t k, f
     s = static_cast<float>((at.z_m - sight_.eye().z_m) / place_of(line, k).first);
   }
   if (s >= high_[bin] + kSlopeMargin * std::abs(s)) return 0;
+  if (guesses) return guess_height(line, k, bin);
   return climb_in_bin(line, k, bin, enough_m);
 }
 

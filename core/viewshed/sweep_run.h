@@ -160,6 +160,7 @@ class SweepRun {
   bool is_blocked_in_bin(const Line& line, std::int32_t i, const Position& at, std::size_t bin,
                          float s);
   void decide(const Line& line, const Line* before);
+  Seen guess_seen(float t, float s, Decision decision) const;
   Seen decide_seen(const Line& line, const Line* before, std::int32_t k, Decision decision);
 
   bool stands_aside(std::int32_t line, std::int32_t i) const;
@@ -167,6 +168,7 @@ class SweepRun {
   bool is_enough(double z_m, const Line& line, std::int32_t k, float enough_m) const;
   float climb_all(std::int32_t line, std::int32_t i);
   float climb_in_bin(const Line& line, std::int32_t k, std::size_t bin, float enough_m);
+  float guess_height(const Line& line, std::int32_t k, std::size_t bin) const;
   float climb_to(const Line& line, const Line* before, std::int32_t k, float enough_m);
   void climb(const Line& line, const Line* before);
   void offer(std::int32_t line, std::int32_t i, float height_m);

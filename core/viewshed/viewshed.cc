@@ -82,6 +82,41 @@ SweepCounts all_judged(const SampleWindow& window) {
   return counts;
 }
 
+/// What a view over thinned ground finds, given to all samples that each of its own stands for.
+/// @param look     (ground, eye, raster of its samples) -> window
+/// @param of_void, beyond  the answers of void samples, and of those that the sweep does not reach
+template <typename Value, typename Look>
+SampleWindow over_thinned(const ViewGround& ground, const std::optional<EarthFrame>& earth,
+                          const ViewshedEye& eye, std::span<Value> result, Value of_void,
+                          Value beyond, const Look& look) {
+  constexpr std::int32_t kStep = ThinnedGround::kStep;
+  const ThinnedGround& thin = *ground.thinned;
+  ViewGround over = ground.obstacles ? ViewGround::under(thin.stands(), thin.blocks())
+                                     : ViewGround(thin.stands());
+  over.tops = &thin.tops();
+  over.deciding = ground.deciding;
+  ViewshedEye from = eye;
+  from.position = raised_over(eye.position, ground_under_m(ground.blocks(), eye.position),
+                              ground_under_m(thin.blocks(), eye.position));
+  const auto thin_columns = static_cast<std::size_t>(thin.stands().columns());
+  LargeArray<Value> found(thin_columns * static_cast<std::size_t>(thin.stands().rows()));
+  const SampleWindow swept = look(over, from, found.span());
+  const GroundGrid& grid = ground.stands;
+  SampleWindow window = window_of(grid, eye, EyeBearings(eye.position, earth));
+  for_rows(window, [&](std::int32_t row) {
+    for (std::int32_t column = window.first_column; column <= window.last_column; ++column) {
+      const std::int32_t c = column / kStep, r = row / kStep;
+      Value& to = result[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.columns()) +
+                         static_cast<std::size_t>(column)];
+      to = !grid.is_known(column, row) ? of_void
+           : swept.contains(c, r)
+               ? found[static_cast<std::size_t>(r) * thin_columns + static_cast<std::size_t>(c)]
+               : beyond;
+    }
+  });
+  return window;
+}
+
 /// The least height at a sample within an eye's limits, from that which the ground leaves.
 float within_limits(const GroundGrid& grid, const EyeBearings& bearings, const ViewLimits& limits,
                     std::int32_t column, std::int32_t row, float least_m) {
@@ -118,6 +153,12 @@ SeenTotals count_piece(std::span<const Seen> sight) {
 SampleWindow heights_from(const ViewGround& ground, const std::optional<EarthFrame>& earth,
                           const ViewshedEye& eye, std::span<float> least_m, SweepCounts* counts) {
   const GroundGrid& grid = ground.stands;
+  if (ground.thinned)
+    return over_thinned(ground, earth, eye, least_m, std::numeric_limits<float>::quiet_NaN(),
+                        std::numeric_limits<float>::quiet_NaN(),
+                        [&](const ViewGround& over, const ViewshedEye& from, std::span<float> to) {
+                          return heights_from(over, earth, from, to, counts);
+                        });
   const EyeBearings bearings(eye.position, earth);
   const SampleWindow window = window_of(grid, eye, bearings);
   SweepCounts found;
@@ -143,7 +184,7 @@ SampleWindow heights_from(const ViewGround& ground, const std::optional<EarthFra
 void LeastHeight::lower(const ViewGround& ground, const std::optional<EarthFrame>& earth,
                         const ViewshedEye& eye, SweepCounts* counts) {
   const GroundGrid& grid = ground.stands;
-  if (ground.tin) {
+  if (ground.tin || ground.thinned) {
     LargeArray<float> own_m(least_m_.size());
     add(heights_from(ground, earth, eye, own_m.span(), counts), own_m.span());
     return;
@@ -185,6 +226,11 @@ SampleWindow view_from(const ViewGround& ground, const std::optional<EarthFrame>
                        const ViewshedEye& eye, std::span<Seen> sight, SweepCounts* counts,
                        const Progress& progress) {
   const GroundGrid& grid = ground.stands;
+  if (ground.thinned)
+    return over_thinned(ground, earth, eye, sight, Seen::kUnknown, Seen::kHidden,
+                        [&](const ViewGround& over, const ViewshedEye& from, std::span<Seen> to) {
+                          return view_from(over, earth, from, to, counts);
+                        });
   const EyeBearings bearings(eye.position, earth);
   const SampleWindow window = window_of(grid, eye, bearings);
   SweepCounts found;

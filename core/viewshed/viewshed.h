@@ -11,6 +11,7 @@
 #include "core/threads/progress.h"
 #include "core/viewshed/grid_sight.h"
 #include "core/viewshed/part_sweep.h"
+#include "core/viewshed/thinned_ground.h"
 #include "core/viewshed/view_limits.h"
 
 namespace scarp {
@@ -42,10 +43,12 @@ struct ViewGround {
     return ground;
   }
 
+  const GroundGrid& blocks() const { return obstacles ? *obstacles : stands; }
   /// Of grids: what a sweep takes.
   SweptGround swept() const {
-    SweptGround swept(obstacles ? *obstacles : stands, stands);
+    SweptGround swept(blocks(), stands);
     swept.tops = tops;
+    swept.deciding = deciding;
     return swept;
   }
 
@@ -54,9 +57,13 @@ struct ViewGround {
   const TinIndex* tin = nullptr;
   /// Of what swept() has, for many eyes: measured once. Null: measured by each.
   const GroundTops* tops = nullptr;
+  Deciding deciding = Deciding::kExactly;
+  /// Of grids: swept in their place; samples get the answer of that which stands for them.
+  const ThinnedGround* thinned = nullptr;
 };
 
-/// What one eye sees within its limits, exactly what GridSight or line_of_sight judges.
+/// What one eye sees within its limits: exactly what GridSight or line_of_sight judges, unless the
+/// ground is thinned or decided by bounds.
 /// @param earth        of the grid's frame; nothing where it is flat
 /// @param sight[out]   [rows * columns]; only the window returned is written
 /// @return the window within reach; outside it nothing is within the limits

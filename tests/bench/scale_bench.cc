@@ -1,7 +1,7 @@
 // Terrain larger than memory: time, memory and bytes of builds by the size of the DEM, and what one
 // question to a finished scene costs.
 //   scripts/bench scale [--samples 4,16,100] [--memory 2GiB] [--max-error 30] [--fans 64]
-//                       [--tile-samples 1024] [--dem FILE] [--folder DIR]
+//                       [--tile-samples 1024] [--dem FILE] [--folder DIR] [--json FILE]
 // Makes its own terrain (tests/support/fractal_ground.h), millions of samples each; --dem takes a
 // file instead. Each build runs the program itself, so that the kernel counts its memory alone.
 #include <fcntl.h>
@@ -103,6 +103,7 @@ Ran run_program(const std::vector<std::string>& arguments, const std::string& ou
 struct Options {
   std::vector<double> millions = {4, 16, 100};
   std::string memory = "2GiB", max_error = "30", fans = "64", tile_samples = "1024", dem, folder;
+  std::string json_file;  // besides the table
 };
 
 Options parse(int argc, char** argv) {
@@ -124,6 +125,8 @@ Options parse(int argc, char** argv) {
       options.tile_samples = value;
     } else if (name == "--dem") {
       options.dem = value;
+    } else if (name == "--json") {
+      options.json_file = value;
     } else if (name == "--folder") {
       options.folder = value;
     } else {
@@ -141,7 +144,8 @@ std::uint64_t bytes_of_folder(const std::string& path) {
 }
 
 /// One size: a row of the table.
-void measure(const Options& options, const std::string& dem, const std::string& folder) {
+void measure(const Options& options, const std::string& dem, const std::string& folder,
+             json& rows) {
   const std::string scene = folder + "/bench.scene", out = folder + "/out";
   const Ran build = run_program({"build", dem, "-o", scene, "--overwrite", "--json", "--memory",
                                  options.memory, "--max-error", options.max_error, "--fans",
@@ -165,6 +169,12 @@ void measure(const Options& options, const std::string& dem, const std::string& 
              static_cast<double>(bytes_of_folder(scene)) / samples,
              1e3 * answer["open_s"].get<double>(), answer["tiles_read"].get<int>(),
              answer["tiles"].get<int>(), 1e3 * answer["answer_s"].get<double>());
+  rows.push_back({{"samples", samples},
+                  {"seconds", build.wall_s},
+                  {"cpu_seconds", build.cpu_s},
+                  {"peak_mib", build.peak_mib},
+                  {"bytes_a_sample", static_cast<double>(bytes_of_folder(scene)) / samples}});
+  if (!options.json_file.empty()) std::ofstream(options.json_file) << rows.dump(1) << '\n';
   for (const json& stage : report["stages"])
     fmt::print("  {:<10} {:9.1f} s {:7.0f} MiB\n", stage["name"].get<std::string>(),
                stage["seconds"].get<double>(), stage["peak_memory_bytes"].get<double>() / 0x1p20);
@@ -189,15 +199,16 @@ int main(int argc, char** argv) try {
   fmt::print("{:>8} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>11} {:>8}\n", "samples",
              "triangles", "build, s", "us/sample", "cpu us/s", "peak MiB", "B/sample", "open, ms",
              "tiles read", "cull, ms");
+  json rows = json::array();
   if (!options.dem.empty()) {
-    measure(options, options.dem, folder);
+    measure(options, options.dem, folder, rows);
     return 0;
   }
   for (const double millions : options.millions) {
     const int side = static_cast<int>(std::lround(std::sqrt(millions * 1e6)));
     const std::string dem = fmt::format("{}/fractal-{}.tif", folder, side);
     if (!fs::exists(dem)) write_fractal_dem(dem, side, side, 1);
-    measure(options, dem, folder);
+    measure(options, dem, folder, rows);
   }
 } catch (const std::exception& failure) {
   fmt::print(stderr, "{}\n", failure.what());

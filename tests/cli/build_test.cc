@@ -276,6 +276,25 @@ TEST_F(BuiltScene, WhatABudgetChoosesIsRepeatedByExplicitFlags) {
   EXPECT_EQ(again["parameters"], scene["parameters"]);
 }
 
+TEST_F(BuiltScene, AccuracyIsRecordedChoosesTheSettingsAndNeverLoosensCulling) {
+  std::map<std::string, json> scenes;
+  for (const std::string accuracy : {"exact", "fast"}) {
+    const std::string path = folder_->path("at-" + accuracy);
+    const RunResult run = run_scarp("$SCARP build " + dem_ + " -o " + path + " --accuracy " +
+                                    accuracy + (accuracy == "exact" ? " --max-error 150" : ""));
+    ASSERT_EQ(run.exit_code, 0) << run.errors;
+    scenes[accuracy] = read_json(path + "/scene.json")["parameters"];
+    EXPECT_EQ(scenes[accuracy]["accuracy"], accuracy);
+    EXPECT_EQ(read_json(path + "/report.json")["parameters"]["accuracy"], accuracy);
+  }
+  EXPECT_EQ(scenes["exact"]["max_error_m"], 150);
+  EXPECT_GT(scenes["exact"]["fans"], scenes["fast"]["fans"]);
+  const RunResult judged =
+      run_scarp("$SCARP verify " + folder_->path("at-fast") + " --eyes 2 --heights 2,300 --json");
+  ASSERT_EQ(judged.exit_code, 0) << judged.errors;
+  for (const json& counts : json::parse(judged.output)) EXPECT_EQ(counts["falsely_culled"], 0);
+}
+
 TEST(Budget, IsKeptToByTheMostFansThatFit) {
   const CertifyCost cost{1, 0.1, 0.5};  // base, each fan, measuring
   for (const double seconds : {7.0, 10.0, 60.0}) {

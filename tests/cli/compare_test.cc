@@ -5,11 +5,13 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 
-#include "cli/compare_picture.h"
+#include "cli/compare/compared_job.h"
+#include "cli/compare/job_chart.h"
 #include "tests/support/run_scarp.h"
 #include "tests/support/temp_folder.h"
 
@@ -51,57 +53,80 @@ class CompareCommand : public testing::Test {
   static inline std::string scene_;
 };
 
-TEST_F(CompareCommand, ChartsBothMethodsWithTheirDefaultsAndCertifiedIsNeverWrong) {
+json point_of(const json& job, const std::string& method, const std::string& setting) {
+  for (const json& point : job["points"])
+    if (point["method"] == method && point["setting"] == setting) return point;
+  return {};
+}
+
+void expect_whole_page(const std::string& folder, const json& result) {
+  const std::string page = read_text(folder + "/compare.html");
+  EXPECT_EQ(page.find("http"), page.find("http://www.w3.org/2000/svg")) << "needs the network";
+  for (const json& job : result["jobs"])
+    for (const json& chart : job["charts"]) {
+      const std::string name = chart["file"];
+      CPLXMLNode* svg = CPLParseXMLString(read_text(folder + "/" + name).c_str());
+      ASSERT_NE(svg, nullptr) << name;
+      EXPECT_STREQ(svg->pszValue, "svg");
+      CPLDestroyXMLNode(svg);
+      EXPECT_FALSE(chart["front"].empty()) << name;
+    }
+  EXPECT_EQ(json::parse(read_text(folder + "/compare.json")), result);
+}
+
+TEST_F(CompareCommand, ChartsBothMethodsOfASceneAndCertifiedIsNeverWrong) {
   const std::string out = folder_->path("compared");
   const RunResult run =
       run_scarp("$SCARP compare " + scene_ + " -o " + out + " --eyes 2 --heights 2,300 --json");
   ASSERT_EQ(run.exit_code, 0) << run.errors;
   const json result = json::parse(run.output);
+  ASSERT_EQ(result["jobs"].size(), 1U);
+  const json& job = result["jobs"][0];
   std::set<std::string> defaults;
-  for (const json& setting : result["settings"]) {
-    if (setting["default"]) defaults.insert(setting["method"]);
-    EXPECT_GT(setting["seconds"], 0);
-    EXPECT_GT(setting["bytes_per_triangle"], 0);
-    ASSERT_EQ(setting["heights"].size(), 2U);
-    for (const json& c : setting["heights"]) {
-      EXPECT_EQ(c["triangles"], 2 * result["triangles"].get<int>());
-      EXPECT_EQ(c["hidden"],
-                result["settings"][0]["heights"][c["eye_height_m"] == 2 ? 0 : 1]["hidden"]);
-      if (setting["method"] == "certified") {
-        EXPECT_EQ(c["falsely_culled"], 0);
-        EXPECT_LE(c["culled"], c["in_hidden_groups"]);
-      }
+  for (const json& point : job["points"]) {
+    if (point["default"]) defaults.insert(point["method"]);
+    EXPECT_GT(point["figures"]["seconds"], 0);
+    EXPECT_GT(point["figures"]["bytes_a_triangle"], 0);
+    if (point["method"] == "certified") {
+      EXPECT_EQ(point["figures"]["falsely_culled_triangles"], 0);
+      EXPECT_FALSE(point["unsafe"]);
     }
   }
-  EXPECT_EQ(defaults, (std::set<std::string>{"certified", "thesis"}));
-  EXPECT_GE(result["settings"].size(), 10U);
-  EXPECT_TRUE(result["left_out"].empty());
+  EXPECT_EQ(defaults, (std::set<std::string>{"certified"}));
+  EXPECT_GE(job["points"].size(), 10U);
+  EXPECT_TRUE(job["left_out"].empty());
+  expect_whole_page(out, result);
+}
 
-  const std::string csv = read_text(out + "/compare.csv");
-  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'),
-            static_cast<std::ptrdiff_t>(1 + 2 * result["settings"].size()));
-  std::istringstream lines(csv);
-  for (std::string line; std::getline(lines, line);) {
-    // Labels are quoted and hold at most one comma more.
-    const auto commas = std::count(line.begin(), line.end(), ',');
-    EXPECT_TRUE(commas == 18 || (commas == 19 && line.find("fans, ") != std::string::npos)) << line;
+TEST_F(CompareCommand, OfADemEveryJobIsThereAndWhatIsExactIsNeverWrong) {
+  const std::string out = folder_->path("dem");
+  const RunResult run = run_scarp("$SCARP compare " + folder_->path("hills.asc") + " -o " + out +
+                                  " --eyes 1 --heights 2 --time 50s --json");
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  const json result = json::parse(run.output);
+  std::map<std::string, json> jobs;
+  for (const json& job : result["jobs"]) jobs[job["name"]] = job;
+  for (const char* name : {"viewshed", "heights", "horizon", "mesh", "groups"})
+    ASSERT_TRUE(jobs.contains(name)) << name;
+  EXPECT_EQ(point_of(jobs["viewshed"], "scarp", "exact")["figures"]["wrong_percent"], 0);
+  EXPECT_GT(point_of(jobs["viewshed"], "gdal_viewshed", "edge")["figures"]["wrong_percent"], 0);
+  EXPECT_LT(point_of(jobs["heights"], "scarp", "exact")["figures"]["mean_error_m"], 1e-3);
+  EXPECT_EQ(point_of(jobs["horizon"], "scarp", "0.3 degrees")["figures"]["outside_bounds"], 0);
+  for (const json& point : jobs["mesh"]["points"]) {
+    if (point["method"] == "meshoptimizer") continue;
+    EXPECT_LE(point["figures"]["largest_error_m"], point["figures"]["asked_m"].get<double>() + 1e-6)
+        << point;
   }
-  CPLXMLNode* svg = CPLParseXMLString(read_text(out + "/compare.svg").c_str());
-  ASSERT_NE(svg, nullptr);
-  EXPECT_STREQ(svg->pszValue, "svg");
-  CPLDestroyXMLNode(svg);
+  EXPECT_EQ(result["facts"].count("input hills.asc"), 1U);
+  expect_whole_page(out, result);
 }
 
 TEST_F(CompareCommand, LeavesOutWhatDoesNotFitIntoTheTimeAndSaysSo) {
   const std::string out = folder_->path("hasty");
   const RunResult run = run_scarp("$SCARP compare " + scene_ + " -o " + out +
                                   " --eyes 1 --heights 2 --time 0.05s --json");
-  if (run.exit_code == 0) {
-    EXPECT_FALSE(json::parse(run.output)["left_out"].empty());
-  } else {
-    EXPECT_NE(run.errors.find("no setting fits"), std::string::npos) << run.errors;
-    EXPECT_FALSE(std::filesystem::exists(out));
-  }
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  EXPECT_FALSE(json::parse(run.output)["jobs"][0]["left_out"].empty());
 }
 
 TEST_F(CompareCommand, RefusalsAreOneLineAndLeaveNothingBehind) {
@@ -114,9 +139,10 @@ TEST_F(CompareCommand, RefusalsAreOneLineAndLeaveNothingBehind) {
     std::string says;
   };
   const Refusal refusals[] = {
-      {scene_ + " -o " + taken, 1, "exists already"},
-      {scene_ + " -o " + folder_->path("none/deep"), 1, "beside existing ones"},
-      {scene_ + " -o " + folder_->path("hills.asc"), 1, "not a folder"},
+      {scene_ + " -o " + taken, 1, "exists"},
+      {scene_ + " -o " + taken + " --overwrite", 1, "taken"},
+      {scene_ + " -o " + folder_->path("none/deep"), 1, "none/deep"},
+      {scene_ + " -o " + folder_->path("hills.asc"), 1, "exists"},
       {folder_->path("missing") + " -o " + folder_->path("x"), 1, "missing"},
       {scene_ + " -o " + folder_->path("x") + " --time soon", 2, "90s or 5min"},
       {scene_ + " -o " + folder_->path("x") + " --eyes 0", 2, "--eyes"},
@@ -132,16 +158,31 @@ TEST_F(CompareCommand, RefusalsAreOneLineAndLeaveNothingBehind) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(taken), {}), 1);
 }
 
-TEST(ComparePicture, DrawsOnePointAndEscapesWords) {
-  PictureComparison picture;
-  picture.title = "a < b & c";
-  picture.methods.push_back({"one", true, {{1, 16, 0.5, "alpha", "omega", true, false}}});
-  const std::string svg = draw_comparison(picture);
+TEST(JobChart, DrawsAPointAtZeroAndEscapesWords) {
+  ComparedJob job;
+  job.title = "a < b & c";
+  job.charts = {{"seconds", "s", "error", "e", ""}};
+  job.points = {{"one", "alpha", {{"seconds", 1}, {"error", 0}}, true, false, false, ""},
+                {"two", "beta", {{"seconds", 2}, {"error", 3}}, false, true, true, ""},
+                {"two", "gamma", {{"seconds", 2}}, false, false, false, ""}};
+  const std::string svg = draw_chart(job, job.charts[0]);
   EXPECT_NE(svg.find("a &lt; b &amp; c"), std::string::npos);
-  for (const char* label : {"alpha", "omega"})
-    EXPECT_EQ(svg.find(label), svg.rfind(label)) << label;  // each in its own chart only
+  for (const char* label : {"alpha", "beta"}) EXPECT_NE(svg.find(label), std::string::npos);
+  EXPECT_EQ(svg.find("gamma"), std::string::npos);  // has no error
   EXPECT_EQ(svg.find("nan"), std::string::npos);
   EXPECT_EQ(svg.find("inf"), std::string::npos);
+}
+
+TEST(ParetoFront, HoldsWhatNoOtherBeatsAndNeverTheJudge) {
+  const auto point = [](double seconds, double error, bool is_judge = false) {
+    return ComparedPoint{"m", "", {{"s", seconds}, {"e", error}}, false, is_judge, false, ""};
+  };
+  ComparedPoint unsafe = point(0.5, 0.5);
+  unsafe.is_unsafe = true;
+  const std::vector<ComparedPoint> points = {
+      point(1, 5), point(2, 3), point(2, 4), point(3, 3), point(4, 0, true), point(5, 1), unsafe};
+  EXPECT_EQ(pareto_front(points, "s", "e"),
+            (std::vector<bool>{true, true, false, false, false, true, false}));
 }
 
 }  // namespace

@@ -94,6 +94,24 @@ TEST_F(HorizonCommand, WritesThreeBandsAnAzimuthAndSaysHow) {
   EXPECT_EQ(read(4)[5 * kColumns], -32768);
 }
 
+TEST_F(HorizonCommand, AccuracyChoosesTheToleranceUnlessItIsGiven) {
+  struct Case {
+    const char *flags, *tolerance, *accuracy;
+    int bands;
+  };
+  for (const Case& c : {Case{"", "0.3", "exact", 12}, Case{" --accuracy high", "1", "high", 12},
+                        Case{" --accuracy fast", "3", "fast", 4},
+                        Case{" --accuracy high --tolerance 0.5", "0.5", "high", 12}}) {
+    const RunResult result =
+        horizon("-o " + out() + " --azimuths 4 --earth flat --overwrite" + c.flags);
+    ASSERT_EQ(result.exit_code, 0) << result.errors;
+    const GDALDatasetUniquePtr dataset(GDALDataset::Open(out().c_str(), GDAL_OF_RASTER));
+    EXPECT_STREQ(dataset->GetMetadataItem("TOLERANCE_DEG"), c.tolerance);
+    EXPECT_STREQ(dataset->GetMetadataItem("ACCURACY"), c.accuracy);
+    EXPECT_EQ(dataset->GetRasterCount(), c.bands);
+  }
+}
+
 TEST_F(HorizonCommand, AgreesWithTheHorizonOfAPlace) {
   ASSERT_EQ(horizon("-o " + out() + " --azimuths 8 --distance " + out("far.tif")).exit_code, 0);
   // Centre of the second cell of the second row.

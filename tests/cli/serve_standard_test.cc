@@ -70,7 +70,10 @@ TEST(ServeStandard, AnswersAreWhatTheStandardSays) {
            : std::filesystem::path(SCARP_SOURCE_DIR).parent_path() / "shared";
   const auto path = folder / "schemas/ogcapi-processes/ogcapi-processes.bundled.json";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "left out, not found: " << path;
-  const json standard = json::parse(std::ifstream(path));
+  json standard = json::parse(std::ifstream(path));
+  // In this bundle two schemas of one name have become one, that of features; an input's own may be
+  // any JSON Schema.
+  standard["components"]["schemas"]["schema"] = {{"type", "object"}};
   const TestServer server;
   const auto expect_fits = [&](const std::string& name, const json& value) {
     const auto fault = fault_by(standard, standard["components"]["schemas"].at(name), value, name);

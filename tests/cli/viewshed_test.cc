@@ -92,6 +92,20 @@ TEST_F(ViewshedCommand, WritesWhatIsSeenAndSaysHow) {
   EXPECT_NE(out->GetRasterBand(1)->GetColorTable(), nullptr);
 }
 
+TEST_F(ViewshedCommand, EachAccuracyIsMarkedAndSeesNearlyTheSame) {
+  for (const std::string accuracy : {"exact", "high", "fast"}) {
+    const RunResult result = view(std::string(kEye) + " --json --overwrite --accuracy " + accuracy);
+    ASSERT_EQ(result.exit_code, 0) << result.errors;
+    const json report = json::parse(result.output);
+    EXPECT_EQ(report["accuracy"], accuracy);
+    EXPECT_EQ(report["visible_samples"], 30) << accuracy;
+    const GDALDatasetUniquePtr out(
+        GDALDataset::Open(folder_.path("out.tif").c_str(), GDAL_OF_RASTER));
+    EXPECT_STREQ(out->GetMetadataItem("ACCURACY"), accuracy.c_str());
+  }
+  EXPECT_EQ(view(std::string(kEye) + " --accuracy best").exit_code, 2);
+}
+
 TEST_F(ViewshedCommand, ModesOfSeveralEyes) {
   const std::string eyes = std::string(kEye) + " --observer 501150,3999850,3";
   ASSERT_EQ(view(eyes + " --mode count").exit_code, 0);

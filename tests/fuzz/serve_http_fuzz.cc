@@ -1,4 +1,5 @@
 #include <netinet/in.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -54,6 +55,10 @@ std::string talk(std::uint16_t port, const std::uint8_t* data, std::size_t size)
   std::string answer;
   ssize_t got = ::connect(client, reinterpret_cast<const sockaddr*>(&address), sizeof address);
   if (got == 0 && size > 0) got = ::send(client, data, size, MSG_NOSIGNAL);
+  // Who closes its half before the answer has left; what is whole is answered before this is over.
+  constexpr int kWaitMs = 1;
+  pollfd answered{client, POLLIN, 0};
+  ::poll(&answered, 1, kWaitMs);
   ::shutdown(client, SHUT_WR);
   char bytes[4096];
   while ((got = ::recv(client, bytes, sizeof bytes, 0)) > 0)
