@@ -114,7 +114,8 @@ std::unique_ptr<SightSurface> open_surface(const std::vector<std::string>& sourc
   if (!scene)
     return std::make_unique<GridSurface>(
         std::make_shared<const Ground>(read_ground(sources, options, progress)));
-  const auto loaded = std::make_shared<const LoadedScene>(*scene, ScenePart{options.memory_budget_bytes});
+  const auto loaded =
+      std::make_shared<const LoadedScene>(*scene, ScenePart{options.memory_budget_bytes});
   return std::make_unique<TinSurface>(loaded, loaded->index, loaded->frame);
 }
 

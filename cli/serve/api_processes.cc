@@ -82,6 +82,8 @@ HttpResponse as_document_of(const Process& process, const std::string& format,
   json value;
   if (format == "application/json") {
     value = json::parse(*result.body);
+    // The standard has objects as values of their own, so that a member named "value" is no riddle.
+    if (value.is_object()) value = {{"value", value}};
   } else if (format.ends_with("json")) {
     value = {{"value", json::parse(*result.body)}, {"mediaType", format}};
   } else {

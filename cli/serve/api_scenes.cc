@@ -39,7 +39,7 @@ MapTile tile_of(const Call& call) {
 
 bool is_layer(const ServedScene& scene, const std::string& layer) {
   return layer == "hillshade" || layer == "terrain-rgb" || layer == "viewshed" ||
-         (layer == "groups" && scene.is_scene());
+         ((layer == "groups" || layer == "group-ids") && scene.is_scene());
 }
 
 /// The deepest zoom that shows more than the one before.
@@ -56,7 +56,7 @@ json Api::scene_json(const Call& call, const ServedScene& scene) const {
   const std::string own = "/scenes/" + encode_segment(scene.name());
   json links = json::array();
   links.push_back(link(call, "self", own));
-  for (const char* layer : {"hillshade", "terrain-rgb", "groups"})
+  for (const char* layer : {"hillshade", "terrain-rgb", "groups", "group-ids"})
     if (is_layer(scene, layer))
       links.push_back(link(call, layer, own + "/tiles/" + layer + ".json"));
   links.push_back(link(call, "height", own + "/height"));
@@ -160,7 +160,7 @@ void Api::add_tile_routes() {
          : std::string(ending) == "tif" ? "image/tiff"
                                         : "application/json"});
   add({"GET", "/scenes/{name}/tiles/{layer}.json", "tilejson",
-       "TileJSON of a layer: hillshade, terrain-rgb, groups, or viewshed with its query",
+       "TileJSON of a layer: hillshade, terrain-rgb, groups, group-ids, or viewshed with its query",
        optional_view, false, [this](Call& call) { return tile_json(call); }});
   add({"GET", "/scenes/{name}/tiles/{layer}/{z}/{x}/{y}.png", "tile",
        "A tile of 256 x 256 pixels in web mercator", optional_view, true,
@@ -218,7 +218,7 @@ HttpResponse Api::tile_json(Call& call) const {
   if (!is_layer(scene, layer))
     throw Refusal(
         404, fmt::format("layer '{}': is not there; hillshade, terrain-rgb{} was expected", layer,
-                         scene.is_scene() ? ", groups" : ""));
+                         scene.is_scene() ? ", groups, group-ids" : ""));
   std::string query = "?v=" + version_;
   if (layer == "viewshed") {
     if (!call.query.contains("observer"))
@@ -243,6 +243,9 @@ HttpResponse Api::tile_json(Call& call) const {
   if (layer == "terrain-rgb") {
     description["encoding"] = "mapbox";
     description["description"] = "height_m = -10000 + (65536 R + 256 G + B) 0.1";
+  } else if (layer == "group-ids") {
+    description["description"] =
+        "group = 65536 R + 256 G + B; 16777215: in no group, and always drawn";
   }
   return json_response(description);
 }
@@ -264,6 +267,8 @@ HttpResponse Api::tile(Call& call, const std::string& layer, const MapTile& at) 
       made->png = terrain_rgb_tile(scene, at);
     } else if (layer == "groups") {
       made->png = groups_tile(scene, at);
+    } else if (layer == "group-ids") {
+      made->png = group_numbers_tile(scene, at);
     } else {
       if (!query.contains("observer"))
         throw Refusal(400, "query: 'observer' is missing: LON,LAT[,H] of an eye was expected");

@@ -215,6 +215,27 @@ MercatorBox box_around(const ServedScene& scene, const SampleWindow& window, dou
           all.north_m - std::floor((all.north_m - north) / step_m) * step_m};
 }
 
+/// The groups under a tile's pixels.
+struct GroupsOfPixels {
+  std::vector<GroupIndex> own;      ///< kNone: none
+  std::vector<std::uint8_t> known;  ///< whether there is ground
+
+  GroupsOfPixels(const ServedScene& scene, const MapTile& tile)
+      : own(kSide * kSide, kNone), known(kSide * kSide) {
+    const std::vector<RasterPlace> places = places_of(scene.map(), tile);
+    const GroundGrid& grid = scene.source().samples();
+    const std::vector<GroupIndex>& groups = scene.group_of_samples();
+    const auto columns = static_cast<std::size_t>(grid.columns());
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      const auto sample = nearest(places[i], grid.columns(), grid.rows());
+      if (!sample) continue;
+      known[i] = grid.is_known(static_cast<std::int32_t>(*sample % columns),
+                               static_cast<std::int32_t>(*sample / columns));
+      own[i] = groups[*sample];
+    }
+  }
+};
+
 }  // namespace
 
 std::string hillshade_tile(const ServedScene& scene, const MapTile& tile) {
@@ -277,22 +298,11 @@ std::string terrain_rgb_tile(const ServedScene& scene, const MapTile& tile) {
 }
 
 std::string groups_tile(const ServedScene& scene, const MapTile& tile) {
-  const std::vector<RasterPlace> places = places_of(scene.map(), tile);
-  const GroundGrid& grid = scene.source().samples();
-  const std::vector<GroupIndex>& groups = scene.group_of_samples();
-  std::vector<GroupIndex> own(places.size(), kNone);
-  std::vector<std::uint8_t> known(places.size());
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const auto sample = nearest(places[i], grid.columns(), grid.rows());
-    if (!sample) continue;
-    const auto columns = static_cast<std::size_t>(grid.columns());
-    known[i] = grid.is_known(static_cast<std::int32_t>(*sample % columns),
-                             static_cast<std::int32_t>(*sample / columns));
-    own[i] = groups[*sample];
-  }
+  const GroupsOfPixels groups(scene, tile);
+  const std::vector<GroupIndex>& own = groups.own;
   std::vector<std::uint8_t> pixels(4 * kSide * kSide);
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    if (!known[i]) continue;
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    if (!groups.known[i]) continue;
     const bool border = (i % kSide + 1 < kSide && own[i + 1] != own[i]) ||
                         (i + kSide < own.size() && own[i + kSide] != own[i]);
     const Rgb colour = own[i] == kNone ? kOrphan : group_colour(own[i]);
@@ -304,6 +314,20 @@ std::string groups_tile(const ServedScene& scene, const MapTile& tile) {
     pixels[4 * i + 1] = channel(colour.g);
     pixels[4 * i + 2] = channel(colour.b);
     pixels[4 * i + 3] = 150;
+  }
+  return encode_png(kTilePx, kTilePx, 4, pixels);
+}
+
+std::string group_numbers_tile(const ServedScene& scene, const MapTile& tile) {
+  const GroupsOfPixels groups(scene, tile);
+  std::vector<std::uint8_t> pixels(4 * kSide * kSide);
+  for (std::size_t i = 0; i < groups.own.size(); ++i) {
+    if (!groups.known[i]) continue;
+    const std::uint32_t number = groups.own[i] == kNone ? kNoGroupNumber : groups.own[i];
+    pixels[4 * i] = static_cast<std::uint8_t>((number >> 16U) & 0xFFU);
+    pixels[4 * i + 1] = static_cast<std::uint8_t>((number >> 8U) & 0xFFU);
+    pixels[4 * i + 2] = static_cast<std::uint8_t>(number & 0xFFU);
+    pixels[4 * i + 3] = 255;
   }
   return encode_png(kTilePx, kTilePx, 4, pixels);
 }

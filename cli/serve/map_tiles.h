@@ -28,6 +28,12 @@ std::string terrain_rgb_tile(const ServedScene& scene, const MapTile& tile);
 /// Groups of a scene, each in a colour of its own, borders darker. Requires a scene.
 std::string groups_tile(const ServedScene& scene, const MapTile& tile);
 
+/// The numbers of the groups as 65536 R + 256 G + B, for clients that paint them themselves; ground
+/// without a group has kNoGroupNumber, and what is void or outside is transparent. Requires a
+/// scene.
+inline constexpr std::uint32_t kNoGroupNumber = 0xFFFFFF;
+std::string group_numbers_tile(const ServedScene& scene, const MapTile& tile);
+
 /// What eyes see: see SeenColours.
 std::string seen_tile(const ServedScene& scene, const EyesRaster& seen, const MapTile& tile);
 
@@ -47,7 +53,7 @@ SeenPicture seen_picture(const ServedScene& scene, const EyesRaster& seen);
 /// Colours of values in pictures of what eyes see, red, green, blue, alpha. Mode visible: what is
 /// not seen is transparent. Mode count: by how many of the eyes. Modes ground and dem: by the
 /// height that a target needs, in steps of kHeightSteps_m.
-inline constexpr std::array<std::uint8_t, 4> kSeenColour = {250, 196, 60, 178};
+inline constexpr std::array<std::uint8_t, 4> kSeenColour = {235, 104, 20, 178};
 inline constexpr std::array<float, 7> kHeightSteps_m = {0.5F, 2, 5, 10, 25, 50, 100};
 
 }  // namespace scarp

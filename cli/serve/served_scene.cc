@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/outputs.h"
+#include "cli/serve/request_target.h"
 #include "core/error/error.h"
 #include "core/threads/stop.h"
 
@@ -18,6 +19,14 @@ constexpr char kLonLat[] = "OGC:CRS84";
 
 /// Pixels of a map around the data, so that its border is drawn whole.
 constexpr double kCellsAround = 2;
+
+/// What the file or folder is called, for commands that clients are shown; never where it lies.
+std::string file_name_of(const std::string& source, const std::string& name) {
+  std::filesystem::path path(source);
+  if (path.filename().empty()) path = path.parent_path();
+  const std::string file = path.filename().string();
+  return is_utf8(file) ? file : name;
+}
 
 /// Of a cell in the middle, in the frame's plane, which is close to the ground there.
 double cell_size_m(const GroundGrid& grid) {
@@ -187,6 +196,7 @@ nlohmann::json ServedScene::description() const {
   const bool any = heights_->highest_m() > heights_->lowest_m() || heights_->lowest_m() != 0;
   nlohmann::json r = {{"name", name_},
                       {"title", name_},
+                      {"file", file_name_of(path_, name_)},
                       {"kind", is_scene_ ? "scene" : "dem"},
                       {"bounds", bounds_},
                       {"centre", {(bounds_[0] + bounds_[2]) / 2, (bounds_[1] + bounds_[3]) / 2}},

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <fstream>
 #include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
@@ -339,6 +340,29 @@ TEST_F(ServeApi, TilesAreWhereTheGroundIs) {
   for (std::size_t i = 3; i < empty.rgba.size(); i += 4) ASSERT_EQ(empty.rgba[i], 0);
 }
 
+TEST_F(ServeApi, NumbersOfGroupsAreWhereTheirColoursAre) {
+  const json scene = get_json("/scenes/valley");
+  EXPECT_EQ(scene["file"], "valley.scene");
+  EXPECT_EQ(get_json("/scenes/alps")["file"], "alps.tif");
+  const std::string at = "/11/1073/724.png";
+  EXPECT_EQ(server_->get("/scenes/alps/tiles/group-ids" + at).status, 404);
+  const Pixels numbers = pixels_of(server_->get("/scenes/valley/tiles/group-ids" + at).body);
+  const Pixels colours = pixels_of(server_->get("/scenes/valley/tiles/groups" + at).body);
+  ASSERT_EQ(numbers.rgba.size(), colours.rgba.size());
+  std::map<std::uint32_t, std::map<std::uint32_t, int>> colours_of;
+  for (std::size_t i = 0; i < numbers.rgba.size(); i += 4) {
+    const std::uint8_t *n = &numbers.rgba[i], *c = &colours.rgba[i];
+    ASSERT_EQ(n[3] != 0, c[3] != 0) << i / 4;
+    if (n[3] == 0) continue;
+    ++colours_of[65'536U * n[0] + 256U * n[1] + n[2]][65'536U * c[0] + 256U * c[1] + c[2]];
+  }
+  EXPECT_GT(colours_of.size(), 3U);
+  for (const auto& [number, counts] : colours_of) {
+    EXPECT_TRUE(number == 0xFFFFFF || number < scene["groups"].get<std::uint32_t>()) << number;
+    EXPECT_LE(counts.size(), 2U) << "a colour, and a darker one along the border, of " << number;
+  }
+}
+
 TEST_F(ServeApi, HeightIsThatOfTheGround) {
   EXPECT_TRUE(get_json("/scenes/alps/height?at=0,0")["ground_m"].is_null());
   for (const char* bad : {"", "?at=", "?at=1", "?at=a,b", "?at=nan,nan", "?at=1e999,2", "?at=8,91",
@@ -416,7 +440,8 @@ TEST_F(ServeApi, FormatsAreNegotiated) {
   EXPECT_EQ(execute("viewshed", named).status, 400);
   json document = body;
   document["response"] = "document";
-  EXPECT_TRUE(json::parse(execute("viewshed", document).body)["viewshed"].contains("href"));
+  EXPECT_TRUE(
+      json::parse(execute("viewshed", document).body)["viewshed"]["value"].contains("href"));
   document["outputs"]["viewshed"]["format"]["mediaType"] = "image/png";
   const json value = json::parse(execute("viewshed", document).body)["viewshed"];
   EXPECT_EQ(value["mediaType"], "image/png");

@@ -14,6 +14,7 @@
 #include "cli/fly/flight.h"
 #include "cli/fly/flight_page.h"
 #include "cli/loaded_scene.h"
+#include "cli/stage_clock.h"
 #include "cli/stopwatch.h"
 #include "core/culling/box_tree.h"
 #include "core/culling/image_culling.h"
@@ -47,7 +48,7 @@ struct Laboratory {
   FlightPlan plan;
 
   Laboratory(const std::string& path, Route route, int frames)
-      : scene(path), batches(scene.tin, scene.groups), tree(batches) {
+      : scene(path, {machine_memory_bytes()}), batches(scene.tin, scene.groups), tree(batches) {
     const GeoFrame::Placer placer(scene.frame);
     for (const Waypoint& w : find_path(scene, route, frames, 1))
       plan.shots.push_back(shot_at(placer, w, {}));

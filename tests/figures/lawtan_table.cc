@@ -20,6 +20,7 @@
 
 #include "cli/fly/flight_path.h"
 #include "cli/loaded_scene.h"
+#include "cli/stage_clock.h"
 #include "cli/svg.h"
 #include "core/culling/cell_culling.h"
 #include "core/culling/certified_culling.h"
@@ -80,7 +81,7 @@ struct Walk {
   std::vector<Shot> shots;
 
   Walk(const std::string& path, Route route, int frames)
-      : scene(path), batches(scene.tin, scene.groups), tree(batches) {
+      : scene(path, {machine_memory_bytes()}), batches(scene.tin, scene.groups), tree(batches) {
     const GeoFrame::Placer placer(scene.frame);
     for (const Waypoint& waypoint : find_path(scene, route, frames, kSeed))
       shots.push_back(shot_at(placer, waypoint, kLens));
