@@ -198,7 +198,7 @@ class ViewshedRun {
     if (!options_.polygons.empty()) return false;  // outlines are traced in memory
     // For each thread the history of a part, with room to spare; and what comes and goes, such as
     // pages between two reliefs and blocks that are packed.
-    constexpr double kHistoryBytesPerSample = 0.15, kWorkBytes = 46e6;
+    constexpr double kHistoryBytesPerSample = 0.15, kWorkBytes = 60e6;
     const auto budget_bytes = static_cast<double>(options_.common.memory_budget_bytes);
     const double work_bytes =
         reading_bytes + kWorkBytes + thread_count() * kHistoryBytesPerSample * samples;
