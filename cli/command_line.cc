@@ -652,8 +652,7 @@ int run_command_line(int argc, char** argv) {
   try {
     for (CommonOptions* common : {&build.common, &cull.common, &verify.common, &compare.common,
                                   &fly.common, &preview.common, &viewshed.common, &sight.common,
-                                  &horizon.common, &check.common, &to.common,
-                                  &serve.common}) {
+                                  &horizon.common, &check.common, &to.common, &serve.common}) {
       if (!common->memory_budget_bytes) common->memory_budget_bytes = machine_memory_bytes() / 2;
       if (common->threads) set_thread_count(common->threads);
     }
