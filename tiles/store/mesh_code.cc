@@ -33,6 +33,8 @@ struct Place {
 
 constexpr std::int64_t kMostColumns = std::int64_t{1} << 31;
 constexpr std::int64_t kMostSteps = std::int64_t{1} << 31;
+/// Lattice steps in plan from a mesh's lowest coordinate: all that a position can be.
+constexpr std::int64_t kMostStepsInPlan = std::int64_t{1} << 40;
 
 constexpr std::size_t kMostTriangles = std::size_t{1} << 30;  // whose edges have numbers
 
@@ -226,9 +228,9 @@ Position origin_of(const Tin& tin) {
   return tin.vertices.empty() ? Position{} : bounds_of(tin.vertices).low;
 }
 
-std::int64_t steps_from(double origin_m, double value_m) {
+std::int64_t steps_from(double origin_m, double value_m, std::int64_t most = kMostStepsInPlan) {
   const double steps = (value_m - origin_m) / kLatticeStepM;
-  assert(steps >= 0 && steps < static_cast<double>(kMostSteps));
+  assert(steps >= 0 && steps < static_cast<double>(most));
   return static_cast<std::int64_t>(steps);
 }
 
@@ -262,7 +264,8 @@ Heights heights_of(const Tin& tin, std::span<const double> heights_m) {
       kUnitsM, [&](double u_m) { return !heights_m.empty() && come_in(u_m, heights_m); });
   if (unit == kUnitsM.end()) {
     const double least_m = origin_of(tin).z_m;
-    for (const Position& p : tin.vertices) heights.units.push_back(steps_from(least_m, p.z_m));
+    for (const Position& p : tin.vertices)
+      heights.units.push_back(steps_from(least_m, p.z_m, kMostSteps));
     return heights;
   }
   heights.unit_m = *unit;
@@ -584,7 +587,7 @@ CoordinateSteps coordinates(const SectionFile& file, const Layout& layout,
         std::abs(step) > 4 * PositionModel::kMostSteps
             ? -1
             : model.at(sample_for(decoder.places()[v], height_steps[v], 0)) + step;
-    if (value < 0 || value > kMostSteps) file.fail("a vertex out of bounds");
+    if (value < 0 || value > kMostStepsInPlan) file.fail("a vertex out of bounds");
     values.push_back(value);
   }
   if (!left_over.at_end()) file.fail("coordinates of more vertices than there are");

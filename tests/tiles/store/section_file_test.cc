@@ -305,6 +305,19 @@ SampledTin torn_grid(std::uint64_t seed) {
   return mesh;
 }
 
+TEST(TinFile, CompactRoundTripOfAMeshAsWideAsTheLatticeReaches) {
+  Tin tin = test::grid_tin(12, 12);
+  const Bounds bounds = bounds_of(tin.vertices);
+  const double more = 0x1p27 / (bounds.high.x_m - bounds.low.x_m);
+  std::vector<std::int64_t> samples;
+  for (Position& p : tin.vertices) {
+    p = {round_to_lattice(more * p.x_m), round_to_lattice(more * p.y_m), p.z_m};
+    samples.push_back(static_cast<std::int64_t>(samples.size()));
+  }
+  const Bytes bytes = compact_tin_writer(tin, samples, 12).to_bytes();
+  expect_same(read_sampled_tin(SectionFile::from_memory(bytes, "wide")), tin, samples);
+}
+
 TEST(TinFile, CompactRoundTripOfTornMeshes) {
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
