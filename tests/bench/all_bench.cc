@@ -355,7 +355,7 @@ json kept_of(const ComparedRun& run) {
 
 /// @return how many became worse
 int compare_with_kept(const json& kept, const json& now) {
-  constexpr double kSlower = 1.5, kLessAccurate = 1.05, kLeastError = 1e-4;
+  constexpr double kSlower = 2, kLessAccurate = 1.05, kLeastError = 1e-4;
   int worse = 0;
   for (const auto& [job, points] : kept.items())
     for (const auto& [name, was] : points.items()) {
