@@ -45,8 +45,6 @@ struct AccuracyGround {
   ViewGround ground;
 };
 
-constexpr Accuracy kAccuracies[] = {Accuracy::kExact, Accuracy::kHigh, Accuracy::kFast};
-
 std::string command_of(const ComparedGround& ground, const std::string& flags) {
   return fmt::format(
       "scarp viewshed '{}' --observer {} -o seen.tif{}{}", fmt::join(ground.files, "' '"),
@@ -78,6 +76,13 @@ class GdalViewshed {
   double curvature() const {
     const FrameDescription& frame = ground_.dem.frame->description();
     return frame.earth == Earth::kFlat ? 0 : 1 - frame.refraction;
+  }
+
+  std::string command(const std::string& flags) const {
+    const ComparedGround::Eye& eye = ground_.eyes.front();
+    return fmt::format("gdal_viewshed{} -ox {:.10g} -oy {:.10g} -oz 2 -md 0 -cc {:g} '{}' seen.tif",
+                       flags, ground_.dem.x_of(eye.column), ground_.dem.y_of(eye.row), curvature(),
+                       ground_.files.front());
   }
 
   /// @param values[out]  [rows * columns]
@@ -125,11 +130,95 @@ struct Wrong {
   }
 };
 
-class ViewshedComparison {
+/// Answers of eyes beside the judge's, for all samples.
+/// @tparam Errors  add(truth, found) of one eye after the other, then put(point)
+template <typename Value, typename Errors>
+class EyeComparison {
+ protected:
+  EyeComparison(const ComparedGround& ground, const Progress& progress)
+      : ground_(ground), progress_(progress), found_(sample_count(ground)) {}
+
+  void tell(double share) const {
+    if (progress_) progress_(share);
+  }
+
+  /// @param look  (eye number, found[out])
+  template <typename Look>
+  void judge(const Look& look) {
+    truth_.assign(ground_.eyes.size(), std::vector<Value>(found_.size()));
+    const Timed time = timed(1, [&] {
+      for (std::size_t i = 0; i < truth_.size(); ++i) look(i, std::span<Value>(truth_[i]));
+    });
+    Errors none;
+    for (const std::vector<Value>& truth : truth_) none.add(truth, truth);
+    finish({"scarp, every sample judged", "judge", {}, false, true, false, ""}, time, none);
+  }
+
+  /// Times a look from all eyes, and counts what it gets wrong.
+  template <typename Look>
+  void point(ComparedPoint point, const Look& look) {
+    const Timed time = timed(kComparedRuns, [&] {
+      for (std::size_t i = 0; i < truth_.size(); ++i) look(i, std::span<Value>(found_));
+    });
+    Errors errors;
+    for (std::size_t i = 0; i < truth_.size(); ++i) {
+      look(i, std::span<Value>(found_));
+      errors.add(truth_[i], found_);
+    }
+    finish(std::move(point), time, errors);
+  }
+
+  /// Every accuracy of ours.
+  /// @param flags  of the command besides
+  /// @param look   (ground, eye, found[out])
+  template <typename Look>
+  void points_of_ours(const std::string& flags, const Look& look) {
+    for (const Accuracy accuracy : {Accuracy::kExact, Accuracy::kHigh, Accuracy::kFast}) {
+      const AccuracyGround at(ground_.grid, accuracy);
+      const bool is_exact = accuracy == Accuracy::kExact;
+      const std::string chosen =
+          is_exact ? std::string() : std::string(" --accuracy ") + name_of(accuracy);
+      point({"scarp",
+             name_of(accuracy),
+             {},
+             is_exact,
+             false,
+             false,
+             command_of(ground_, flags + chosen)},
+            [&](std::size_t i, std::span<Value> found) {
+              look(at.ground, eye_over(ground_.grid, ground_.eyes[i]), found);
+            });
+    }
+  }
+
+  /// gdal_viewshed's algorithm, or nothing where it cannot be asked, which the job then says.
+  std::optional<GdalViewshed> gdal() {
+    if (!ground_.dem.frame->is_geographic())
+      return std::optional<GdalViewshed>(std::in_place, ground_);
+    job_.left_out.push_back("gdal_viewshed: it takes degrees for metres");
+    return {};
+  }
+
+  /// @param time  of all eyes together
+  void finish(ComparedPoint point, const Timed& time, const Errors& errors) {
+    const auto eyes = static_cast<double>(ground_.eyes.size());
+    add_time(point, {time.median_s / eyes, time.least_s / eyes, time.most_s / eyes});
+    errors.put(point);
+    job_.points.push_back(std::move(point));
+  }
+
+  const ComparedGround& ground_;
+  const Progress& progress_;
+  ComparedJob job_;
+  std::vector<Value> found_;
+  std::vector<std::vector<Value>> truth_;  // of each eye
+};
+
+class ViewshedComparison : private EyeComparison<Seen, Wrong> {
  public:
   ViewshedComparison(const ComparedGround& ground, const Progress& progress,
                      std::span<const ViewshedPeer> peers)
-      : ground_(ground), progress_(progress), peers_(peers), seen_(sample_count(ground)) {}
+      : EyeComparison(ground, progress), peers_(peers) {}
 
   ComparedJob run() {
     job_.name = "viewshed";
@@ -141,12 +230,16 @@ class ViewshedComparison {
         fmt::format("median of {} runs. Ours on {} threads, gdal_viewshed's algorithm on one.",
                     kComparedRuns, thread_count())};
     job_.charts = {{"seconds", "seconds an eye", "wrong_percent", "samples wrong, %", ""}};
-    judge();
-    if (progress_) progress_(0.3);
-    look_ours();
-    if (progress_) progress_(0.5);
+    judge([&](std::size_t i, std::span<Seen> truth) {
+      exhaustive_viewshed(ground_.grid, eye_over(ground_.grid, ground_.eyes[i]).position, 0, truth);
+    });
+    tell(0.3);
+    points_of_ours("", [&](const ViewGround& over, const ViewshedEye& eye, std::span<Seen> seen) {
+      view_from(over, ground_.earth, eye, seen);
+    });
+    tell(0.5);
     look_over_meshes();
-    if (progress_) progress_(0.9);
+    tell(0.9);
     look_with_gdal();
     for (const ViewshedPeer& peer : peers_) look_with(peer);
     return std::move(job_);
@@ -158,65 +251,11 @@ class ViewshedComparison {
     Wrong wrong;
     double seconds = 0;
     for (std::size_t i = 0; i < ground_.eyes.size(); ++i) {
-      seconds += peer.look(ground_.eyes[i], seen_) / static_cast<double>(ground_.eyes.size());
-      wrong.add(truth_[i], seen_);
+      seconds += peer.look(ground_.eyes[i], found_);
+      wrong.add(truth_[i], found_);
     }
-    ComparedPoint point{peer.method, peer.setting, {}, false, false, false, peer.command};
-    add_time(point, {seconds, seconds, seconds});
-    wrong.put(point);
-    job_.points.push_back(std::move(point));
-  }
-
-  /// Times a look from all eyes, and counts what it gets wrong.
-  /// @param look  (eye number, seen[out])
-  template <typename Look>
-  void point(ComparedPoint point, const Look& look) {
-    Wrong wrong;
-    const Timed time = timed(kComparedRuns, [&] {
-      for (std::size_t i = 0; i < ground_.eyes.size(); ++i) look(i, std::span<Seen>(seen_));
-    });
-    for (std::size_t i = 0; i < ground_.eyes.size(); ++i) {
-      look(i, std::span<Seen>(seen_));
-      wrong.add(truth_[i], seen_);
-    }
-    const auto eyes = static_cast<double>(ground_.eyes.size());
-    add_time(point, {time.median_s / eyes, time.least_s / eyes, time.most_s / eyes});
-    wrong.put(point);
-    job_.points.push_back(std::move(point));
-  }
-
-  void judge() {
-    truth_.assign(ground_.eyes.size(), std::vector<Seen>(seen_.size()));
-    const Timed time = timed(1, [&] {
-      for (std::size_t i = 0; i < ground_.eyes.size(); ++i)
-        exhaustive_viewshed(ground_.grid, eye_over(ground_.grid, ground_.eyes[i]).position, 0,
-                            truth_[i]);
-    });
-    ComparedPoint judge{"scarp, every sample judged", "judge", {}, false, true, false, ""};
-    const auto eyes = static_cast<double>(ground_.eyes.size());
-    add_time(judge, {time.median_s / eyes, time.least_s / eyes, time.most_s / eyes});
-    Wrong wrong;
-    for (const std::vector<Seen>& seen : truth_) wrong.add(seen, seen);
-    wrong.put(judge);
-    job_.points.push_back(judge);
-  }
-
-  void look_ours() {
-    for (const Accuracy accuracy : kAccuracies) {
-      const AccuracyGround at(ground_.grid, accuracy);
-      const std::string flags =
-          accuracy == Accuracy::kExact ? "" : std::string(" --accuracy ") + name_of(accuracy);
-      point({"scarp",
-             name_of(accuracy),
-             {},
-             accuracy == Accuracy::kExact,
-             false,
-             false,
-             command_of(ground_, flags)},
-            [&](std::size_t i, std::span<Seen> seen) {
-              view_from(at.ground, ground_.earth, eye_over(ground_.grid, ground_.eyes[i]), seen);
-            });
-    }
+    finish({peer.method, peer.setting, {}, false, false, false, peer.command},
+           {seconds, seconds, seconds}, wrong);
   }
 
   void look_over_meshes() {
@@ -258,11 +297,8 @@ class ViewshedComparison {
   }
 
   void look_with_gdal() {
-    if (ground_.dem.frame->is_geographic()) {
-      job_.left_out.push_back("gdal_viewshed: it takes degrees for metres");
-      return;
-    }
-    const GdalViewshed gdal(ground_);
+    const std::optional<GdalViewshed> gdal = this->gdal();
+    if (!gdal) return;
     constexpr std::pair<GDALViewshedMode, const char*> kModes[] = {
         {GVM_Edge, "edge"}, {GVM_Diagonal, "diagonal"}, {GVM_Max, "max"}, {GVM_Min, "min"}};
     std::vector<std::uint8_t> values;
@@ -273,26 +309,16 @@ class ViewshedComparison {
              false,
              false,
              false,
-             mode != GVM_Edge ? std::string()
-                              : fmt::format("gdal_viewshed -ox {:.10g} -oy {:.10g} -oz 2 -md 0 "
-                                            "-cc {:g} '{}' seen.tif",
-                                            ground_.dem.x_of(ground_.eyes.front().column),
-                                            ground_.dem.y_of(ground_.eyes.front().row),
-                                            gdal.curvature(), ground_.files.front())},
+             mode == GVM_Edge ? gdal->command("") : std::string()},
             [&](std::size_t i, std::span<Seen> seen) {
-              gdal.look(ground_.eyes[i], mode, GVOT_NORMAL, GDT_Byte, values);
+              gdal->look(ground_.eyes[i], mode, GVOT_NORMAL, GDT_Byte, values);
               std::transform(values.begin(), values.end(), seen.begin(), [](std::uint8_t v) {
                 return v == 1 ? Seen::kVisible : Seen::kHidden;
               });
             });
   }
 
-  const ComparedGround& ground_;
-  const Progress& progress_;
   const std::span<const ViewshedPeer> peers_;
-  ComparedJob job_;
-  std::vector<Seen> seen_;
-  std::vector<std::vector<Seen>> truth_;  // of each eye
 };
 
 /// How far heights of all eyes are off, metres, where the judge has one.
@@ -317,10 +343,10 @@ struct HeightsOff {
   }
 };
 
-class HeightComparison {
+class HeightComparison : private EyeComparison<float, HeightsOff> {
  public:
   HeightComparison(const ComparedGround& ground, const Progress& progress)
-      : ground_(ground), progress_(progress), heights_m_(sample_count(ground)) {}
+      : EyeComparison(ground, progress) {}
 
   ComparedJob run() {
     job_.name = "heights";
@@ -331,103 +357,50 @@ class HeightComparison {
                     ground_.dem.columns, ground_.dem.rows, ground_.eyes.size(), kComparedRuns)};
     job_.charts = {
         {"seconds", "seconds an eye", "mean_error_m", "mean error of the least height, m", ""}};
-    judge();
-    if (progress_) progress_(0.5);
-    for (const Accuracy accuracy : kAccuracies) {
-      const AccuracyGround at(ground_.grid, accuracy);
-      const std::string flags =
-          accuracy == Accuracy::kExact ? "" : std::string(" --accuracy ") + name_of(accuracy);
-      point({"scarp",
-             name_of(accuracy),
-             {},
-             accuracy == Accuracy::kExact,
-             false,
-             false,
-             command_of(ground_, " --mode ground" + flags)},
-            [&](std::size_t i, std::span<float> to) {
-              heights_from(at.ground, ground_.earth, eye_over(ground_.grid, ground_.eyes[i]), to);
-            });
-    }
-    if (progress_) progress_(0.8);
+    judge(
+        [&](std::size_t i, std::span<float> truth_m) { judge_heights(ground_.eyes[i], truth_m); });
+    tell(0.5);
+    points_of_ours(" --mode ground",
+                   [&](const ViewGround& over, const ViewshedEye& eye, std::span<float> to) {
+                     heights_from(over, ground_.earth, eye, to);
+                   });
+    tell(0.8);
     look_with_gdal();
     return std::move(job_);
   }
 
  private:
-  template <typename Look>
-  void point(ComparedPoint point, const Look& look) {
-    HeightsOff off;
-    const Timed time = timed(kComparedRuns, [&] {
-      for (std::size_t i = 0; i < ground_.eyes.size(); ++i) look(i, std::span<float>(heights_m_));
-    });
-    for (std::size_t i = 0; i < ground_.eyes.size(); ++i) {
-      look(i, std::span<float>(heights_m_));
-      off.add(truth_m_[i], heights_m_);
-    }
-    const auto eyes = static_cast<double>(ground_.eyes.size());
-    add_time(point, {time.median_s / eyes, time.least_s / eyes, time.most_s / eyes});
-    off.put(point);
-    job_.points.push_back(std::move(point));
-  }
-
-  void judge() {
+  void judge_heights(const ComparedGround::Eye& eye, std::span<float> truth_m) const {
     const GroundGrid& grid = ground_.grid;
-    truth_m_.assign(ground_.eyes.size(), std::vector<float>(heights_m_.size()));
-    const Timed time = timed(1, [&] {
-      for (std::size_t i = 0; i < ground_.eyes.size(); ++i) {
-        const GridSight sight(grid, eye_over(grid, ground_.eyes[i]).position);
-        parallel_for(static_cast<std::size_t>(grid.rows()), [&](std::size_t r) {
-          for (std::int32_t c = 0; c < grid.columns(); ++c)
-            truth_m_[i]
-                    [r * static_cast<std::size_t>(grid.columns()) + static_cast<std::size_t>(c)] =
-                        grid.is_known(c, static_cast<std::int32_t>(r))
-                            ? least_height_m(sight, grid, c, static_cast<std::int32_t>(r))
-                            : std::numeric_limits<float>::quiet_NaN();
-        });
-      }
+    const GridSight sight(grid, eye_over(grid, eye).position);
+    parallel_for(static_cast<std::size_t>(grid.rows()), [&](std::size_t r) {
+      const auto row = static_cast<std::int32_t>(r);
+      for (std::int32_t column = 0; column < grid.columns(); ++column)
+        truth_m[r * static_cast<std::size_t>(grid.columns()) + static_cast<std::size_t>(column)] =
+            grid.is_known(column, row) ? least_height_m(sight, grid, column, row)
+                                       : std::numeric_limits<float>::quiet_NaN();
     });
-    ComparedPoint judge{"scarp, every sample judged", "judge", {}, false, true, false, ""};
-    const auto eyes = static_cast<double>(ground_.eyes.size());
-    add_time(judge, {time.median_s / eyes, time.least_s / eyes, time.most_s / eyes});
-    HeightsOff().put(judge);
-    job_.points.push_back(judge);
   }
 
   void look_with_gdal() {
-    if (ground_.dem.frame->is_geographic()) {
-      job_.left_out.push_back("gdal_viewshed: it takes degrees for metres");
-      return;
-    }
-    const GdalViewshed gdal(ground_);
+    const std::optional<GdalViewshed> gdal = this->gdal();
+    if (!gdal) return;
     std::vector<double> values;
-    const auto command = [&](const char* mode) {
-      return fmt::format(
-          "gdal_viewshed -om {} -ox {:.10g} -oy {:.10g} -oz 2 -md 0 -cc {:g} '{}' "
-          "seen.tif",
-          mode, ground_.dem.x_of(ground_.eyes.front().column),
-          ground_.dem.y_of(ground_.eyes.front().row), gdal.curvature(), ground_.files.front());
-    };
-    point({"gdal_viewshed", "GROUND", {}, false, false, false, command("GROUND")},
+    point({"gdal_viewshed", "GROUND", {}, false, false, false, gdal->command(" -om GROUND")},
           [&](std::size_t i, std::span<float> to) {
-            gdal.look(ground_.eyes[i], GVM_Edge, GVOT_MIN_TARGET_HEIGHT_FROM_GROUND, GDT_Float64,
-                      values);
+            gdal->look(ground_.eyes[i], GVM_Edge, GVOT_MIN_TARGET_HEIGHT_FROM_GROUND, GDT_Float64,
+                       values);
             for (std::size_t k = 0; k < values.size(); ++k)
               to[k] = static_cast<float>(std::max(0.0, values[k]));
           });
-    point({"gdal_viewshed", "DEM", {}, false, false, false, command("DEM")},
+    point({"gdal_viewshed", "DEM", {}, false, false, false, gdal->command(" -om DEM")},
           [&](std::size_t i, std::span<float> to) {
-            gdal.look(ground_.eyes[i], GVM_Edge, GVOT_MIN_TARGET_HEIGHT_FROM_DEM, GDT_Float64,
-                      values);
+            gdal->look(ground_.eyes[i], GVM_Edge, GVOT_MIN_TARGET_HEIGHT_FROM_DEM, GDT_Float64,
+                       values);
             for (std::size_t k = 0; k < values.size(); ++k)
               to[k] = static_cast<float>(std::max(0.0, values[k] - ground_.dem.heights_m[k]));
           });
   }
-
-  const ComparedGround& ground_;
-  const Progress& progress_;
-  ComparedJob job_;
-  std::vector<float> heights_m_;
-  std::vector<std::vector<float>> truth_m_;  // of each eye
 };
 
 }  // namespace
