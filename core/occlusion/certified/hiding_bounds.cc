@@ -26,6 +26,9 @@ constexpr std::int32_t kFansAtOnce = 4;
 
 constexpr float kEverything = std::numeric_limits<float>::infinity();
 
+/// Groups that are worked on one after another, in the same memory.
+constexpr std::size_t kGroupsAtOnce = 4;
+
 /// An edge is halved this often at most.
 constexpr std::size_t kMostHalvings = 6;
 
@@ -97,9 +100,14 @@ class Bounding {
         ridges[i].cross(ridge_edges_, views[i], options_.width * mean_unit_m_,
                         looked_from(views[i]));
       });
-      parallel_for(bounds_.circle.size(), [&](std::size_t group) {
-        for (std::size_t i = 0; i < count; ++i)
-          look_along(views[i], ridges[i], rings, turns[i], static_cast<GroupIndex>(group));
+      parallel_for((groups() + kGroupsAtOnce - 1) / kGroupsAtOnce, [&](std::size_t chunk) {
+        Workspace work;
+        const std::size_t end = std::min(groups(), (chunk + 1) * kGroupsAtOnce);
+        for (std::size_t group = chunk * kGroupsAtOnce; group < end; ++group) {
+          number_corners(static_cast<GroupIndex>(group), work);
+          for (std::size_t i = 0; i < count; ++i)
+            look_along(views[i], ridges[i], rings, turns[i], static_cast<GroupIndex>(group), work);
+        }
       });
       if (progress) progress(static_cast<double>(begin + kFansAtOnce) / options_.fans);
     }
@@ -108,6 +116,8 @@ class Bounding {
   }
 
  private:
+  std::size_t groups() const { return bounds_.circle.size(); }
+
   void draw_circles(std::uint32_t groups) {
     for (GroupIndex g = 0; g < groups; ++g) {
       std::vector<Position> corners;
@@ -202,6 +212,22 @@ class Bounding {
     bool is_tried = false, is_walled = false;
   };
 
+  /// Memory of a Look, and what all fans have in common of a group.
+  struct Workspace {
+    std::vector<VertexIndex> corners;  // of the group
+    FanCrests crests;
+    std::vector<FanCrests::Ends> borders;
+    std::vector<double> low_u_m, low_v_m, high_v_m;  // of crests
+    std::vector<std::uint32_t> candidates;
+    std::vector<FanEdge> exits;
+    std::array<PieceTargets, kMostHalvings + 1> targets;
+    Places places;
+    std::array<ReachedCells, kMostHalvings + 1> reached_by_depth;
+    std::vector<Sighted> sighted;
+    std::vector<CellPlane> planes;
+    Wall wall;
+  };
+
   /// Works out one group for the rays of one fan.
   struct Look {
     const FanView& view;
@@ -212,27 +238,66 @@ class Bounding {
     double radius_m, height_m, unit_m;
     float* bounds;  // of the group: [kRings * sectors]
     ReachedCells::Known known;
-    std::vector<FanEdge> crests{};
-    std::vector<std::uint32_t> candidates{};
-    std::vector<FanEdge> exits{};  // all that rays can leave over
-    std::array<PieceTargets, kMostHalvings + 1> targets{};
-    Places places{};
-    std::array<ReachedCells, kMostHalvings + 1> reached_by_depth{};
+    Workspace& work;
+    FanCrests& crests = work.crests;
+    std::vector<std::uint32_t>& candidates = work.candidates;
+    std::vector<FanEdge>& exits = work.exits;  // all that rays can leave over
+    std::array<PieceTargets, kMostHalvings + 1>& targets = work.targets;
+    Places& places = work.places;
+    std::vector<Sighted>& sighted = work.sighted;
+    std::vector<CellPlane>& planes = work.planes;
+    Wall& wall = work.wall;
     std::size_t depth = 0;  // of halving
-    std::vector<Sighted> sighted{};
-    int failures = 0;  // of ridges to carry a wall
-    std::vector<CellPlane> planes{};
-    Wall wall{};
+    int failures = 0;       // of ridges to carry a wall
 
-    ReachedCells& reached() { return reached_by_depth[depth]; }
+    ReachedCells& reached() { return work.reached_by_depth[depth]; }
   };
 
-  FanEdge in_fan(const FanView& view, const GroupEdges::Edge& edge) const {
-    return {view.vertices[edge[0]], view.vertices[edge[1]], edge[0], edge[1]};
+  /// Numbers the corners of a group's crests.
+  void number_corners(GroupIndex group, Workspace& work) const {
+    std::vector<VertexIndex>& corners = work.corners;
+    corners.clear();
+    for (const auto& edge : edges_.crests_of(group))
+      corners.insert(corners.end(), edge.begin(), edge.end());
+    std::sort(corners.begin(), corners.end());
+    corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
+    const auto corner_of = [&](VertexIndex vertex) {
+      return static_cast<std::uint32_t>(std::lower_bound(corners.begin(), corners.end(), vertex) -
+                                        corners.begin());
+    };
+    work.crests.ends.clear();
+    for (const auto& edge : edges_.crests_of(group))
+      work.crests.ends.push_back({corner_of(edge[0]), corner_of(edge[1])});
+    work.borders.clear();
+    for (const auto& edge : edges_.borders_of(group))
+      work.borders.push_back({corner_of(edge[0]), corner_of(edge[1])});
+  }
+
+  /// Places a group's corners, crests and exits in the fan's frame.
+  static void place_group(Look& look) {
+    Workspace& work = look.work;
+    look.crests.place_corners(look.view, work.corners);
+    const std::size_t size = look.crests.ends.size();
+    work.low_u_m.resize(size), work.low_v_m.resize(size), work.high_v_m.resize(size);
+    for (std::size_t i = 0; i < size; ++i) {
+      const auto [a, b] = look.crests.ends[i];
+      work.low_u_m[i] = std::min(look.crests.u_m[a], look.crests.u_m[b]);
+      work.low_v_m[i] = std::min(look.crests.v_m[a], look.crests.v_m[b]);
+      work.high_v_m[i] = std::max(look.crests.v_m[a], look.crests.v_m[b]);
+    }
+    look.exits.clear();
+    for (const auto& [a, b] : work.borders) {
+      const FanEdge exit{look.crests.corner(a), look.crests.corner(b), a, b};
+      if (!is_entry(look.view, exit)) look.exits.push_back(exit);
+    }
+    // What is high is seen first: it lowers bounds, and the rest needs no close look.
+    std::sort(look.exits.begin(), look.exits.end(), [](const FanEdge& p, const FanEdge& q) {
+      return p.a.z_m + p.b.z_m > q.a.z_m + q.b.z_m;
+    });
   }
 
   void look_along(const FanView& view, const Ridges& ridges, const RingTable& rings,
-                  const Turns& turns, GroupIndex group) {
+                  const Turns& turns, GroupIndex group, Workspace& work) {
     const Circle& circle = bounds_.circle[group];
     const std::size_t first_cell =
         static_cast<std::size_t>(group) * static_cast<std::size_t>(options_.sectors) * kRings;
@@ -246,18 +311,11 @@ class Bounding {
               bounds_.height_m[group],
               unit_m_[group],
               bounds,
-              {bounds, least_.data() + first_cell}};
+              {bounds, least_.data() + first_cell},
+              work};
     look.centre =
         place_in(view.fan, circle.x_m - origin_x_m_, circle.y_m - origin_y_m_, look.height_m);
-    for (const auto& edge : edges_.crests_of(group)) look.crests.push_back(in_fan(view, edge));
-    for (const auto& edge : edges_.borders_of(group)) {
-      const FanEdge exit = in_fan(view, edge);
-      if (!is_entry(view, exit)) look.exits.push_back(exit);
-    }
-    // What is high is seen first: it lowers bounds, and the rest needs no close look.
-    std::sort(look.exits.begin(), look.exits.end(), [](const FanEdge& p, const FanEdge& q) {
-      return p.a.z_m + p.b.z_m > q.a.z_m + q.b.z_m;
-    });
+    place_group(look);
     for (const FanEdge& edge : look.exits) {
       behind(look, edge);
       look_from_piece(look, {edge.a, edge.b, &edge}, look.candidates);
@@ -270,14 +328,18 @@ class Bounding {
     const double low_v_m = std::min(edge.a.v_m, edge.b.v_m) - drift_m;
     const double high_v_m = std::max(edge.a.v_m, edge.b.v_m) + drift_m;
     const double high_u_m = std::max(edge.a.u_m, edge.b.u_m) + 16 * look.view.error_m;
-    look.candidates.clear();
-    for (std::uint32_t i = 0; i < look.crests.size(); ++i) {
-      const FanEdge& crest = look.crests[i];
-      if (std::max(crest.a.v_m, crest.b.v_m) >= low_v_m &&
-          std::min(crest.a.v_m, crest.b.v_m) <= high_v_m &&
-          std::min(crest.a.u_m, crest.b.u_m) <= high_u_m)
-        look.candidates.push_back(i);
+    const Workspace& work = look.work;
+    const std::size_t size = look.crests.ends.size();
+    look.candidates.resize(size);
+    std::size_t count = 0;
+    // Without a branch: which crests are taken follows no pattern.
+    for (std::uint32_t i = 0; i < size; ++i) {
+      look.candidates[count] = i;
+      count += static_cast<unsigned>(work.high_v_m[i] >= low_v_m) &
+               static_cast<unsigned>(work.low_v_m[i] <= high_v_m) &
+               static_cast<unsigned>(work.low_u_m[i] <= high_u_m);
     }
+    look.candidates.resize(count);
   }
 
   /// Whether every ray over the piece leaves the group once more, over one edge: then it has been
@@ -320,7 +382,7 @@ class Bounding {
     if (look.depth == 0)
       look.reached().reach(look.rings, look.turns, borders_, low, high, look.known);
     else
-      look.reached().reach_part(look.reached_by_depth[look.depth - 1], low, high);
+      look.reached().reach_part(look.work.reached_by_depth[look.depth - 1], low, high);
     // The outer of the lanes has the least reach.
     return high + low >= kLanes ? high : low;
   }

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/horizon/certified/edge_plane.h"
+#include "core/threads/for_each_target.h"
 
 namespace scarp {
 namespace {
@@ -53,47 +55,140 @@ void open_piece(const FanView& view, const ExitPiece& piece, bool is_proper, Wed
   }
 }
 
+/// How far each corner is within each side of a wedge.
+SCARP_FOR_EACH_TARGET
+void measure_corners(const double* u_m, const double* v_m, std::size_t count, const Wedge& wedge,
+                     double* within_low, double* within_high, double* within_behind) {
+  const HalfPlane low = wedge.low, high = wedge.high, behind = wedge.behind;
+  for (std::size_t i = 0; i < count; ++i) {
+    within_low[i] = low.c0 + low.cu * u_m[i] + low.cv * v_m[i];
+    within_high[i] = high.c0 + high.cu * u_m[i] + high.cv * v_m[i];
+    within_behind[i] = behind.c0 + behind.cu * u_m[i] + behind.cv * v_m[i];
+  }
+}
+
+bool is_same(const FanPlace& p, const FanPlace& q) {
+  return p.u_m == q.u_m && p.v_m == q.v_m && p.z_m == q.z_m;
+}
+
+/// Lists the ends of crests within a wedge, corners that crests share once, and has the plane
+/// through the border hold them.
+class TargetList {
+ public:
+  TargetList(const FanView& view, const ExitPiece& piece, const FanCrests& crests,
+             PieceTargets& targets)
+      : border_(*piece.edge),
+        crests_(crests),
+        targets_(targets),
+        plane_(view, border_.a, border_.b),
+        at_corner_m_(kTooNear * 32 * view.error_m) {
+    targets.listed.resize(crests.u_m.size());
+    targets.held.resize(crests.u_m.size());
+    if (++targets.turn == 0) {
+      std::fill(targets.listed.begin(), targets.listed.end(), 0);
+      std::fill(targets.held.begin(), targets.held.end(), 0);
+      targets.turn = 1;
+    }
+    targets.places.clear();
+    for (const auto& [place, corner] :
+         {std::pair{piece.a, border_.from}, std::pair{piece.b, border_.to}}) {
+      targets.places.push_back(place);
+      if (is_same(place, crests.corner(corner))) targets.listed[corner] = targets.turn;
+    }
+  }
+
+  /// The part of a crest from one share of it to another.
+  void add(const FanCrests::Ends& ends, double from, double to) {
+    const bool touches_a = ends[0] == border_.from || ends[1] == border_.from;
+    const bool touches_b = ends[0] == border_.to || ends[1] == border_.to;
+    const FanPlace a = crests_.corner(ends[0]), b = crests_.corner(ends[1]);
+    for (const double share : {from, to}) {
+      const FanPlace place = between(a, b, share);
+      if (is_same(place, a)) {
+        add(place, ends[0], touches_a, touches_b);
+      } else if (is_same(place, b)) {
+        add(place, ends[1], touches_a, touches_b);
+      } else {
+        targets_.places.push_back(place);
+        if (!is_of_border(place, touches_a, touches_b)) plane_.hold(place);
+      }
+    }
+  }
+
+  const EdgePlane& plane() const { return plane_; }
+
+ private:
+  /// A place at a corner.
+  void add(const FanPlace& place, std::uint32_t corner, bool touches_a, bool touches_b) {
+    if (std::exchange(targets_.listed[corner], targets_.turn) != targets_.turn)
+      targets_.places.push_back(place);
+    // Of a border's own corner some crests say nothing, and others do.
+    if (targets_.held[corner] == targets_.turn || is_of_border(place, touches_a, touches_b)) return;
+    targets_.held[corner] = targets_.turn;
+    plane_.hold(place);
+  }
+
+  /// The end that a crest has in common with the border says nothing: the ground around it rises
+  /// from the border as it does further back, where other crests bound it.
+  bool is_of_border(const FanPlace& place, bool touches_a, bool touches_b) const {
+    return (touches_a || touches_b) && plane_.is_too_near(place) &&
+           ((touches_a && is_at(border_.a, place)) || (touches_b && is_at(border_.b, place)));
+  }
+
+  bool is_at(const FanPlace& end, const FanPlace& place) const {
+    return std::abs(end.u_m - place.u_m) + std::abs(end.v_m - place.v_m) <= at_corner_m_;
+  }
+
+  const FanEdge& border_;
+  const FanCrests& crests_;
+  PieceTargets& targets_;
+  EdgePlane plane_;
+  double at_corner_m_;
+};
+
 }  // namespace
 
-void find_targets(const FanView& view, const ExitPiece& piece, std::span<const FanEdge> crests,
+void FanCrests::place_corners(const FanView& view, std::span<const VertexIndex> vertices) {
+  const std::size_t size = (vertices.size() + kPlacesAtOnce - 1) / kPlacesAtOnce * kPlacesAtOnce;
+  u_m.resize(size), v_m.resize(size), z_m.resize(size);
+  for (std::size_t i = 0; i < size; ++i) {
+    const FanPlace& place = view.vertices[vertices[i < vertices.size() ? i : 0]];
+    u_m[i] = place.u_m, v_m[i] = place.v_m, z_m[i] = place.z_m;
+  }
+}
+
+void find_targets(const FanView& view, const ExitPiece& piece, const FanCrests& crests,
                   std::span<const std::uint32_t> candidates, PieceTargets& targets) {
   const FanEdge& border = *piece.edge;
   const bool is_proper = is_exit(view, border);
   Wedge wedge;
   open_piece(view, piece, is_proper, wedge, targets.beam);
-  EdgePlane plane(view, border.a, border.b);
-  const auto is_at = [&](const FanPlace& end, const FanPlace& place) {
-    return std::abs(end.u_m - place.u_m) + std::abs(end.v_m - place.v_m) <=
-           kTooNear * 32 * view.error_m;
-  };
-  targets.places = {piece.a, piece.b};
+  std::vector<double>&low = targets.within_low, &high = targets.within_high,
+  &behind = targets.within_behind;
+  for (auto* column : {&low, &high, &behind}) column->resize(crests.u_m.size());
+  measure_corners(crests.u_m.data(), crests.v_m.data(), crests.u_m.size(), wedge, low.data(),
+                  high.data(), behind.data());
+  TargetList list(view, piece, crests, targets);
   targets.crests.clear();
   for (const std::uint32_t i : candidates) {
-    const FanEdge& crest = crests[i];
+    const auto [a, b] = crests.ends[i];
+    // Most lie wholly outside one of the sides, or within all.
+    if (std::min({std::max(low[a], low[b]), std::max(high[a], high[b]),
+                  std::max(behind[a], behind[b])}) < 0)
+      continue;
     double from = 0, to = 1;
-    cut(wedge.low.at(crest.a), wedge.low.at(crest.b), from, to);
-    if (!(from <= to)) continue;
-    cut(wedge.high.at(crest.a), wedge.high.at(crest.b), from, to);
-    if (!(from <= to)) continue;
-    cut(wedge.behind.at(crest.a), wedge.behind.at(crest.b), from, to);
-    if (!(from <= to)) continue;
-    targets.crests.push_back(i);
-    if (crest.from == border.from && crest.to == border.to) continue;
-    const bool touches_a = crest.from == border.from || crest.to == border.from;
-    const bool touches_b = crest.from == border.to || crest.to == border.to;
-    for (const double share : {from, to}) {
-      const FanPlace place = between(crest.a, crest.b, share);
-      targets.places.push_back(place);
-      // The end that a crest has in common with the border says nothing: the ground around it
-      // rises from the border as it does further back, where other crests bound it.
-      if (plane.is_too_near(place) &&
-          ((touches_a && is_at(border.a, place)) || (touches_b && is_at(border.b, place))))
-        continue;
-      plane.hold(place);
+    if (!(std::min({low[a], low[b], high[a], high[b], behind[a], behind[b]}) >= 0)) {
+      cut(low[a], low[b], from, to);
+      cut(high[a], high[b], from, to);
+      cut(behind[a], behind[b], from, to);
+      if (!(from <= to)) continue;
     }
+    targets.crests.push_back(i);
+    if (a == border.from && b == border.to) continue;
+    list.add(crests.ends[i], from, to);
   }
   targets.plane.reset();
-  if (is_proper && plane.is_held()) targets.plane = plane.plane(piece.a, piece.b);
+  if (is_proper && list.plane().is_held()) targets.plane = list.plane().plane(piece.a, piece.b);
   for (FanPlace& place : targets.places) place.z_m += 2 * view.height_error_m;
 }
 

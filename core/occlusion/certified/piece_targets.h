@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -12,10 +13,24 @@
 
 namespace scarp {
 
-/// An edge in a fan's frame.
+/// Crests of a group in a fan's frame. Their corners are numbered within the group, and kept as
+/// columns, so that they are measured side by side.
+struct FanCrests {
+  using Ends = std::array<std::uint32_t, 2>;  ///< corners
+
+  std::vector<double> u_m, v_m, z_m;  ///< [corners, and repeated up to a multiple of kPlacesAtOnce]
+  std::vector<Ends> ends;             ///< [crests]
+
+  FanPlace corner(std::uint32_t i) const { return {u_m[i], v_m[i], z_m[i]}; }
+
+  /// @param vertices  of the corners, at least one
+  void place_corners(const FanView& view, std::span<const VertexIndex> vertices);
+};
+
+/// A border edge in a fan's frame.
 struct FanEdge {
   FanPlace a, b;
-  VertexIndex from, to;
+  std::uint32_t from, to;  ///< corners, as in FanCrests
 };
 
 /// A part of a border edge of a group, over which rays of a fan leave the group; directed like the
@@ -45,6 +60,12 @@ struct PieceTargets {
   std::vector<FanPlace> places;       ///< corners of what is seen of the group, rounded up
   std::vector<std::uint32_t> crests;  ///< those of the candidates that touch the wedge
   Beam beam;                          ///< of the rays beyond the piece
+
+  // For find_targets: how far corners are within each side of the wedge, and in which turn they
+  // became a place, and one that the plane holds.
+  std::vector<double> within_low, within_high, within_behind;
+  std::vector<std::uint32_t> listed, held;
+  std::uint32_t turn = 0;
 };
 
 /// Finds the ground of a group from which rays of the fan can reach a piece: the wedge behind it.
@@ -52,10 +73,10 @@ struct PieceTargets {
 /// sees none of it over the piece (EdgePlane).
 ///
 /// Side: the plane never above the true one; places never below the ground.
-/// @param crests      edges of the group, in the fan's frame
-/// @param candidates  those that can matter
-/// Cost: O(candidates).
-void find_targets(const FanView& view, const ExitPiece& piece, std::span<const FanEdge> crests,
+/// @param candidates  crests that can matter
+/// @param targets[in,out]  its memory is reused
+/// Cost: O(corners + candidates).
+void find_targets(const FanView& view, const ExitPiece& piece, const FanCrests& crests,
                   std::span<const std::uint32_t> candidates, PieceTargets& targets);
 
 }  // namespace scarp

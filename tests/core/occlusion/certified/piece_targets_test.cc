@@ -22,7 +22,8 @@ struct Patch {
   Tin tin;
   std::vector<GroupIndex> group_of_triangle;
   FanView view;
-  std::vector<FanEdge> crests, borders;
+  FanCrests crests;  // every vertex is a corner
+  std::vector<FanEdge> borders;
 
   explicit Patch(SplitMix64& random)
       : tin(test::triangulated(
@@ -51,7 +52,10 @@ struct Patch {
     const auto in_fan = [&](const GroupEdges::Edge& edge) {
       return FanEdge{view.vertices[edge[0]], view.vertices[edge[1]], edge[0], edge[1]};
     };
-    for (const auto& edge : edges.crests_of(0)) crests.push_back(in_fan(edge));
+    std::vector<VertexIndex> corners(tin.vertices.size());
+    std::iota(corners.begin(), corners.end(), 0U);
+    crests.place_corners(view, corners);
+    for (const auto& edge : edges.crests_of(0)) crests.ends.push_back({edge[0], edge[1]});
     for (const auto& edge : edges.borders_of(0)) borders.push_back(in_fan(edge));
   }
 
@@ -78,7 +82,7 @@ TEST(PieceTargets, AnyPlaneOverThePlacesIsOverAllGroundThatRaysOverThePieceComeF
   for (std::uint64_t seed = 0; seed < 150 && !HasFailure(); ++seed) {
     SplitMix64 random(seed);
     const Patch patch(random);
-    std::vector<std::uint32_t> all(patch.crests.size());
+    std::vector<std::uint32_t> all(patch.crests.ends.size());
     std::iota(all.begin(), all.end(), 0U);
     PieceTargets targets;
     for (const FanEdge& border : patch.borders) {
