@@ -61,11 +61,14 @@ class EdgePlane {
   }
 
   /// Has all of some places on or under the plane.
-  void hold(const Places& places) {
-    const double rise = places.least_rise(
-        {a_.u_m, a_.v_m, a_.z_m, eu_, ev_, along_, error_m_, height_error_m_, kTooNear * error_m_});
-    rise_ = rise < rise_ ? rise : rise_;
+  void hold(const Places& places) { hold_rise(places.least_rise(line())); }
+
+  /// What Places want to know, and what they answer.
+  Places::EdgeLine line() const {
+    return {
+        a_.u_m, a_.v_m, a_.z_m, eu_, ev_, along_, error_m_, height_error_m_, kTooNear * error_m_};
   }
+  void hold_rise(double rise) { rise_ = rise < rise_ ? rise : rise_; }
 
   /// The plane has to pass under everything: it is of no use.
   void give_up() { rise_ = -HUGE_VAL; }
@@ -112,15 +115,18 @@ class CurtainPlane {
   CurtainPlane(const FanView& view, const FanPlace& from, const FanPlace& to)
       : view_(view), near_(from.u_m < to.u_m ? from : to), far_(from.u_m < to.u_m ? to : from) {}
 
-  /// Has all of some places on or under the plane. One that is too near, or beyond, cannot be.
-  void hold(const Places& places) {
-    const double error_m = 8 * view_.error_m;
-    for (const FanPlace& end : {near_, far_}) {
-      const double slope =
-          places.least_slope(end, error_m, 4 * view_.height_error_m, kTooNear * error_m);
-      slope_ = slope < slope_ ? slope : slope_;
-    }
+  /// What Places want to know, and what they answer. Places that are too near, or beyond, cannot
+  /// be on or under the plane.
+  Places::CurtainLine line() const {
+    return {near_.u_m,
+            near_.z_m,
+            far_.u_m,
+            far_.z_m,
+            8 * view_.error_m,
+            4 * view_.height_error_m,
+            kTooNear * 8 * view_.error_m};
   }
+  void hold_slope(double slope) { slope_ = slope < slope_ ? slope : slope_; }
 
   bool is_held() const { return slope_ > -HUGE_VAL && slope_ < HUGE_VAL; }
 

@@ -99,9 +99,10 @@ class Chain {
 std::optional<SkyPlane> plane_over(const FanView& view, const std::array<FanPlace, 2>& edge,
                                    const std::array<FanPlace, 2>& part, const Places& targets) {
   EdgePlane through_edge(view, edge[0], edge[1]);
-  through_edge.hold(targets);
   CurtainPlane curtain(view, part[0], part[1]);
-  curtain.hold(targets);
+  const Places::Rises least = targets.least_rises(through_edge.line(), curtain.line());
+  through_edge.hold_rise(least.edge);
+  curtain.hold_slope(least.curtain);
   if (!through_edge.is_held())
     return curtain.is_held() ? std::optional(curtain.plane()) : std::nullopt;
   SkyPlane plane = through_edge.plane(part[0], part[1]);

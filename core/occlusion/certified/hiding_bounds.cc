@@ -221,7 +221,6 @@ class Bounding {
     std::vector<std::uint32_t> candidates;
     std::vector<FanEdge> exits;
     std::array<PieceTargets, kMostHalvings + 1> targets;
-    Places places;
     std::array<ReachedCells, kMostHalvings + 1> reached_by_depth;
     std::vector<Sighted> sighted;
     std::vector<CellPlane> planes;
@@ -243,7 +242,6 @@ class Bounding {
     std::vector<std::uint32_t>& candidates = work.candidates;
     std::vector<FanEdge>& exits = work.exits;  // all that rays can leave over
     std::array<PieceTargets, kMostHalvings + 1>& targets = work.targets;
-    Places& places = work.places;
     std::vector<Sighted>& sighted = work.sighted;
     std::vector<CellPlane>& planes = work.planes;
     Wall& wall = work.wall;
@@ -421,34 +419,32 @@ class Bounding {
     const FanView& view = look.view;
     ReachedCells& reached = look.reached();
     const auto& reach = look.rings.reach[lane];
-    /// From which ring on cameras are beyond a place.
-    const auto ring_beyond = [&](double u_m) {
+    /// From which ring on, `first` or a later one, cameras are beyond a place.
+    const auto ring_beyond = [&](double u_m, std::size_t first) {
       const double least = (u_m - look.centre.u_m + 4 * view.error_m) / look.radius_m;
-      return static_cast<std::size_t>(std::upper_bound(reach.begin(), reach.end(), least) -
-                                      reach.begin());
+      while (first < kRings && !(reach[first] > least)) ++first;
+      return first;
     };
     const auto raise = [&](const Sighted& sighted) {
       Wall& wall = look.wall;
-      if (!raise_wall(ridge_edges_, view, targets.beam, look.places, sighted.edge, sighted.slope,
+      if (!raise_wall(ridge_edges_, view, targets.beam, targets.places, sighted.edge, sighted.slope,
                       wall))
         return false;
       look.planes.clear();
       for (const SkyPlane& plane : wall.planes) look.planes.push_back(in_cells(look, plane));
-      reached.raise(look.planes, ring_beyond(wall.u_m));
+      reached.raise(look.planes, ring_beyond(wall.u_m, 0));
       return true;
     };
-    look.places.assign(targets.places);
     // A wall is raised on the last ridge before a ring that rises above all before it, if there
     // are rings for which it counts.
     look.sighted.clear();
     const double first_slope = targets.plane ? targets.plane->line_slope : -HUGE_VAL;
-    double slope = -HUGE_VAL, base_m = -HUGE_VAL;
-    const auto see_over = [&](double ridge_slope) {
-      slope = ridge_slope;
-      base_m = slope > -HUGE_VAL ? look.places.tangent_m(slope) : -HUGE_VAL;
+    constexpr Places::Line kNoLine{-HUGE_VAL, -HUGE_VAL};
+    const auto line_of = [&](double slope) {
+      return slope > -HUGE_VAL ? targets.places.tangent(slope) : kNoLine;
     };
-    see_over(first_slope);
-    std::size_t ring = 0;  // all before have what they can get
+    Places::Line line = line_of(first_slope);  // lowest over what has been seen
+    std::size_t ring = 0;                      // all before have what they can get
     std::size_t open_end = reached.end_of_open();
     /// @return whether the last ridge carries a wall, if one is wanted
     const auto raise_before = [&](std::size_t end) {
@@ -469,18 +465,20 @@ class Bounding {
         crossings.begin(), crossings.end(), std::max(piece.a.u_m, piece.b.u_m),
         [](double u_m, const RidgeCrossing& c) { return u_m < static_cast<double>(c.u_m); });
     for (look.failures = 0; ring < open_end; ++next) {
-      while (next != crossings.end() && slope > -HUGE_VAL &&
-             !(static_cast<double>(next->z_m) > base_m + slope * static_cast<double>(next->u_m)))
+      while (next != crossings.end() && line.slope > -HUGE_VAL &&
+             !(static_cast<double>(next->z_m) >
+               line.base_m + line.slope * static_cast<double>(next->u_m)))
         ++next;
       const bool is_last = next == crossings.end();
-      const std::size_t end = is_last ? open_end : ring_beyond(static_cast<double>(next->u_m));
+      const std::size_t end =
+          is_last ? open_end : ring_beyond(static_cast<double>(next->u_m), ring);
       if (end > ring) {
         if (!raise_before(end)) {
           // As if the ridge were not there: it hid others from view.
           ++look.failures;
           next = crossings.begin() + look.sighted.back().crossing;
           look.sighted.pop_back();
-          see_over(look.sighted.empty() ? first_slope : look.sighted.back().slope);
+          line = line_of(look.sighted.empty() ? first_slope : look.sighted.back().slope);
           continue;
         }
         ring = end;
@@ -488,9 +486,9 @@ class Bounding {
       }
       if (is_last) return;
       const auto u_m = static_cast<double>(next->u_m), z_m = static_cast<double>(next->z_m);
-      see_over(look.places.slope_to(u_m, z_m, kLatticeStepM));
-      const double rise_m = z_m + slope * (look.centre.u_m - u_m) - look.height_m;
-      look.sighted.push_back({next->edge, slope, static_cast<float>(rise_m / look.radius_m),
+      line = targets.places.line_to(u_m, z_m, kLatticeStepM);
+      const double rise_m = z_m + line.slope * (look.centre.u_m - u_m) - look.height_m;
+      look.sighted.push_back({next->edge, line.slope, static_cast<float>(rise_m / look.radius_m),
                               next - crossings.begin()});
     }
   }

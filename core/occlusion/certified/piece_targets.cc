@@ -76,7 +76,7 @@ bool is_same(const FanPlace& p, const FanPlace& q) {
 class TargetList {
  public:
   TargetList(const FanView& view, const ExitPiece& piece, const FanCrests& crests,
-             PieceTargets& targets)
+             std::size_t most_crests, PieceTargets& targets)
       : border_(*piece.edge),
         crests_(crests),
         targets_(targets),
@@ -89,7 +89,8 @@ class TargetList {
       std::fill(targets.held.begin(), targets.held.end(), 0);
       targets.turn = 1;
     }
-    targets.places.clear();
+    targets.places.clear(2 + 2 * most_crests);
+    targets.under_plane.clear(2 * most_crests);
     for (const auto& [place, corner] :
          {std::pair{piece.a, border_.from}, std::pair{piece.b, border_.to}}) {
       targets.places.push_back(place);
@@ -110,12 +111,19 @@ class TargetList {
         add(place, ends[1], touches_a, touches_b);
       } else {
         targets_.places.push_back(place);
-        if (!is_of_border(place, touches_a, touches_b)) plane_.hold(place);
+        if (!is_of_border(place, touches_a, touches_b)) targets_.under_plane.push_back(place);
       }
     }
   }
 
-  const EdgePlane& plane() const { return plane_; }
+  /// The plane that holds all of them.
+  const EdgePlane& plane() {
+    if (targets_.under_plane.size() > 0) {
+      targets_.under_plane.complete(0);
+      plane_.hold(targets_.under_plane);
+    }
+    return plane_;
+  }
 
  private:
   /// A place at a corner.
@@ -125,7 +133,7 @@ class TargetList {
     // Of a border's own corner some crests say nothing, and others do.
     if (targets_.held[corner] == targets_.turn || is_of_border(place, touches_a, touches_b)) return;
     targets_.held[corner] = targets_.turn;
-    plane_.hold(place);
+    targets_.under_plane.push_back(place);
   }
 
   /// The end that a crest has in common with the border says nothing: the ground around it rises
@@ -168,7 +176,7 @@ void find_targets(const FanView& view, const ExitPiece& piece, const FanCrests& 
   for (auto* column : {&low, &high, &behind}) column->resize(crests.u_m.size());
   measure_corners(crests.u_m.data(), crests.v_m.data(), crests.u_m.size(), wedge, low.data(),
                   high.data(), behind.data());
-  TargetList list(view, piece, crests, targets);
+  TargetList list(view, piece, crests, candidates.size(), targets);
   targets.crests.clear();
   for (const std::uint32_t i : candidates) {
     const auto [a, b] = crests.ends[i];
@@ -188,8 +196,10 @@ void find_targets(const FanView& view, const ExitPiece& piece, const FanCrests& 
     list.add(crests.ends[i], from, to);
   }
   targets.plane.reset();
-  if (is_proper && list.plane().is_held()) targets.plane = list.plane().plane(piece.a, piece.b);
-  for (FanPlace& place : targets.places) place.z_m += 2 * view.height_error_m;
+  if (is_proper)
+    if (const EdgePlane& plane = list.plane(); plane.is_held())
+      targets.plane = plane.plane(piece.a, piece.b);
+  targets.places.complete(2 * view.height_error_m);
 }
 
 }  // namespace scarp

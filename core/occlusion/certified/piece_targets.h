@@ -57,7 +57,7 @@ struct PieceTargets {
   /// A camera on a ray over the piece, beyond it, is hidden from all of them by the piece itself
   /// if it is strictly under the plane.
   std::optional<SkyPlane> plane;
-  std::vector<FanPlace> places;       ///< corners of what is seen of the group, rounded up
+  Places places;                      ///< corners of what is seen of the group, rounded up
   std::vector<std::uint32_t> crests;  ///< those of the candidates that touch the wedge
   Beam beam;                          ///< of the rays beyond the piece
 
@@ -66,6 +66,7 @@ struct PieceTargets {
   std::vector<double> within_low, within_high, within_behind;
   std::vector<std::uint32_t> listed, held;
   std::uint32_t turn = 0;
+  Places under_plane;  // those that the plane holds, not rounded
 };
 
 /// Finds the ground of a group from which rays of the fan can reach a piece: the wedge behind it.

@@ -117,8 +117,10 @@ TEST(PieceTargets, AnyPlaneOverThePlacesIsOverAllGroundThatRaysOverThePieceComeF
           const double ahead = std::tan(3 * random.unit() - 1.5);
           const double left = std::tan(3 * random.unit() - 1.5);
           double base_m = -HUGE_VAL;
-          for (const FanPlace& place : targets.places)
+          for (std::size_t j = 0; j < targets.places.size(); ++j) {
+            const FanPlace place = targets.places[j];
             base_m = std::max(base_m, place.z_m - ahead * place.u_m - left * place.v_m);
+          }
           EXPECT_LE(*z_m - ahead * u_m - left * v_m, base_m + kRoundingM) << "seed " << seed;
         }
         if (!targets.plane) continue;
