@@ -96,9 +96,9 @@ double tangent_of(const double* u_m, const double* z_m, std::size_t count, doubl
 }
 
 SCARP_FOR_EACH_TARGET
-Places::Line line_to_place(const double* u_m, const double* z_m, std::size_t count, double over_u_m,
-                           double over_z_m, double least_way_m) {
-  Lanes least, most;
+double slope_to_place(const double* u_m, const double* z_m, std::size_t count, double over_u_m,
+                      double over_z_m, double least_way_m) {
+  Lanes least;
   fill(least, HUGE_VAL);
   for (std::size_t i = 0; i < count; i += kPlacesAtOnce)
     for (std::size_t j = 0; j < kPlacesAtOnce; ++j) {
@@ -106,14 +106,7 @@ Places::Line line_to_place(const double* u_m, const double* z_m, std::size_t cou
       const double slope = (over_z_m - z_m[i + j]) / (way_m > least_way_m ? way_m : least_way_m);
       least[j] = slope < least[j] ? slope : least[j];
     }
-  const double slope = least_of(least);
-  fill(most, -HUGE_VAL);
-  for (std::size_t i = 0; i < count; i += kPlacesAtOnce)
-    for (std::size_t j = 0; j < kPlacesAtOnce; ++j) {
-      const double base_m = z_m[i + j] - slope * u_m[i + j];
-      most[j] = base_m > most[j] ? base_m : most[j];
-    }
-  return {slope, greatest_of(most)};
+  return least_of(least);
 }
 
 }  // namespace
@@ -148,7 +141,7 @@ Places::Line Places::tangent(double slope) const {
 }
 
 Places::Line Places::line_to(double u_m, double z_m, double least_way_m) const {
-  return line_to_place(u_m_.data(), z_m_.data(), filled_, u_m, z_m, least_way_m);
+  return tangent(slope_to_place(u_m_.data(), z_m_.data(), filled_, u_m, z_m, least_way_m));
 }
 
 }  // namespace scarp

@@ -172,7 +172,7 @@ class Bounding {
       const double azimuth_rad = azimuth_at(bounds_.layout, s + 0.5);
       directions.push_back({std::cos(azimuth_rad), std::sin(azimuth_rad)});
     }
-    least_.resize(bounds_.slope.size());
+    least_.resize(bounds_.slope.size() + kHintsBeyond);
     parallel_for(bounds_.circle.size(), [&](std::size_t group) {
       const Circle& circle = bounds_.circle[group];
       std::uint16_t* hint = least_.data() + group * directions.size() * kRings;
@@ -225,6 +225,7 @@ class Bounding {
     std::vector<Sighted> sighted;
     std::vector<CellPlane> planes;
     Wall wall;
+    std::vector<std::uint64_t> wanted;  // marks of cells
   };
 
   /// Works out one group for the rays of one fan.
@@ -297,6 +298,7 @@ class Bounding {
   void look_along(const FanView& view, const Ridges& ridges, const RingTable& rings,
                   const Turns& turns, GroupIndex group, Workspace& work) {
     const Circle& circle = bounds_.circle[group];
+    work.wanted.resize(kRings / kCellsMarked * static_cast<std::size_t>(options_.sectors));
     const std::size_t first_cell =
         static_cast<std::size_t>(group) * static_cast<std::size_t>(options_.sectors) * kRings;
     float* bounds = bounds_.slope.data() + first_cell;
@@ -309,11 +311,12 @@ class Bounding {
               bounds_.height_m[group],
               unit_m_[group],
               bounds,
-              {bounds, least_.data() + first_cell},
+              {bounds, least_.data() + first_cell, work.wanted.data()},
               work};
     look.centre =
         place_in(view.fan, circle.x_m - origin_x_m_, circle.y_m - origin_y_m_, look.height_m);
     place_group(look);
+    look.reached().mark(turns, options_.sectors, look.known, work.wanted.data());
     for (const FanEdge& edge : look.exits) {
       behind(look, edge);
       look_from_piece(look, {edge.a, edge.b, &edge}, look.candidates);

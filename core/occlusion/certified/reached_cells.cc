@@ -78,15 +78,7 @@ bool is_any_raised(const float* best, const float* wanted, const float* inverse,
   return any != 0;
 }
 
-float slope_of_hint(std::uint16_t hint) {
-  return std::bit_cast<float>(static_cast<std::uint32_t>(hint) << 16);
-}
-
 }  // namespace
-
-std::uint16_t slope_hint(float slope) {
-  return static_cast<std::uint16_t>(std::bit_cast<std::uint32_t>(slope) >> 16);
-}
 
 RingTable::RingTable(const PolarLayout& layout, const Fan& fan) {
   for (std::size_t k = 0; k < kRings; ++k) {
@@ -140,6 +132,20 @@ void Turns::turn_to(const PolarLayout& layout, const Fan& fan, const RingTable& 
     }
 }
 
+/// Calls visit(cell) for the cells of a run that are marked.
+template <class Visit>
+void visit_marked(const std::uint64_t* marks, const CellRun& run, Visit visit) {
+  for (std::uint32_t begin = run.begin, end = run.begin + run.count; begin < end;) {
+    const std::uint32_t word = begin / kCellsMarked;
+    const std::uint32_t word_end = std::min(end, (word + 1) * kCellsMarked);
+    std::uint64_t left = marks[word] >> (begin % kCellsMarked);
+    if (word_end - begin < kCellsMarked) left &= (std::uint64_t{1} << (word_end - begin)) - 1;
+    for (; left != 0; left &= left - 1)
+      visit(begin + static_cast<std::uint32_t>(std::countr_zero(left)));
+    begin = word_end;
+  }
+}
+
 void ReachedCells::make_room(std::size_t size) {
   if (cell_.size() >= size) return;
   cell_.resize(size), turn_.resize(size);
@@ -148,41 +154,70 @@ void ReachedCells::make_room(std::size_t size) {
     column->resize(size);
 }
 
+void ReachedCells::find_runs() {
+  run_count_ = 0;
+  const auto &first_turn = turns_->first[low_], &last_turn = turns_->last[high_];
+  for (std::size_t k = 0; k < kRings; ++k) {
+    first_run_[k] = run_count_;
+    const std::int32_t count = last_turn[k] - first_turn[k] + 1;
+    if (count <= 0) continue;
+    std::int32_t begin = turns_->middle + first_turn[k];
+    if (begin < 0) begin += sectors_;
+    if (begin >= sectors_) begin -= sectors_;
+    const auto row = static_cast<std::uint32_t>(k) * static_cast<std::uint32_t>(sectors_);
+    const std::int32_t to_end = std::min(count, sectors_ - begin);
+    runs_[run_count_++] = {row + static_cast<std::uint32_t>(begin),
+                           static_cast<std::uint32_t>(to_end)};
+    if (to_end < count) runs_[run_count_++] = {row, static_cast<std::uint32_t>(count - to_end)};
+  }
+  first_run_[kRings] = run_count_;
+}
+
+void ReachedCells::mark(const Turns& turns, std::int32_t sectors, const Known& known,
+                        std::uint64_t* wanted) {
+  turns_ = &turns, low_ = 0, high_ = kLanes - 1, sectors_ = sectors;
+  find_runs();
+  for (std::size_t r = 0; r < run_count_; ++r) {
+    const std::uint32_t begin = runs_[r].begin / kCellsMarked * kCellsMarked;
+    const std::uint32_t end = runs_[r].begin + runs_[r].count;
+    mark_wanted(known.bounds, known.least,
+                {begin, (end - begin + kCellsMarked - 1) / kCellsMarked * kCellsMarked}, wanted);
+  }
+}
+
 void ReachedCells::reach(const RingTable& rings, const Turns& turns,
                          std::span<const SectorBorders> borders, std::size_t low, std::size_t high,
                          const Known& known) {
-  const auto sectors = static_cast<std::int32_t>(borders.size());
-  const auto& first_turn = turns.first[low];
-  const auto& last_turn = turns.last[high];
-  std::size_t most = 0;
-  for (std::size_t k = 0; k < kRings; ++k)
-    most += static_cast<std::size_t>(std::max(0, last_turn[k] - first_turn[k] + 1));
-  make_room(most);
-  rings_ = &rings, turns_ = &turns, low_ = low, high_ = high, sectors_ = sectors;
+  rings_ = &rings, turns_ = &turns, low_ = low, high_ = high;
+  sectors_ = static_cast<std::int32_t>(borders.size());
   hints_ = known.least;
   ring_best_.fill(kNothing);
+  find_runs();
+  std::size_t most = 0;
+  for (std::size_t r = 0; r < run_count_; ++r) most += runs_[r].count;
+  make_room(most);
+  const RingRow& forward_row = forward();
   std::uint32_t wanted = 0;
   for (std::size_t k = 0; k < kRings; ++k) {
     first_[k] = wanted;
-    std::int32_t sector = turns.middle + first_turn[k];
-    if (sector < 0) sector += sectors;
-    if (sector >= sectors) sector -= sectors;
-    for (std::int16_t turn = first_turn[k]; turn <= last_turn[k]; ++turn) {
-      const auto cell =
-          static_cast<std::uint32_t>(k * borders.size() + static_cast<std::size_t>(sector));
-      const float bound = known.bounds[cell];
-      if (bound > slope_of_hint(known.least[cell])) {
+    std::int32_t turn = turns.first[low][k];
+    for (std::size_t r = first_run_[k]; r < first_run_[k + 1]; ++r) {
+      const CellRun run = runs_[r];
+      visit_marked(known.wanted, run, [&](std::uint32_t cell) {
+        const float bound = known.bounds[cell];
+        if (!(bound > slope_of_hint(known.least[cell]))) return;
         const std::size_t i = wanted++;
-        const SectorBorders& border = borders[static_cast<std::size_t>(sector)];
-        cell_[i] = cell, turn_[i] = turn;
+        const SectorBorders& border = borders[cell - k * borders.size()];
+        cell_[i] = cell;
+        turn_[i] = static_cast<std::int16_t>(turn + static_cast<std::int32_t>(cell - run.begin));
         near_inverse_[i] = rings.near_inverse[k], far_inverse_[i] = rings.far_inverse[k];
-        forward_[i] = forward()[k];
+        forward_[i] = forward_row[k];
         low_x_[i] = border.low_x, low_y_[i] = border.low_y;
         high_x_[i] = border.high_x, high_y_[i] = border.high_y;
         best_[i] = kNothing;
         wanted_[i] = bound - kSlopeTolerance;
-      }
-      if (++sector == sectors) sector = 0;
+      });
+      turn += static_cast<std::int32_t>(run.count);
     }
   }
   first_[kRings] = wanted;
@@ -192,6 +227,7 @@ void ReachedCells::reach_part(const ReachedCells& whole, std::size_t low, std::s
   make_room(whole.size());
   rings_ = whole.rings_, turns_ = whole.turns_, low_ = low, high_ = high;
   sectors_ = whole.sectors_, hints_ = whole.hints_, ring_best_ = whole.ring_best_;
+  run_count_ = 0;
   const auto& first_turn = turns_->first[low];
   const auto& last_turn = turns_->last[high];
   std::uint32_t size = 0;
@@ -241,20 +277,13 @@ bool ReachedCells::is_promising(float rise, float slope, std::size_t first, std:
                        first_[end] - begin);
 }
 
-void ReachedCells::lower(float* bounds) const {
+void ReachedCells::lower(float* bounds) {
+  if (run_count_ == 0) find_runs();
   for (std::size_t i = 0; i < size(); ++i) bounds[cell_[i]] = std::min(bounds[cell_[i]], best_[i]);
-  for (std::size_t k = 0; k < kRings; ++k) {
-    float* ring = bounds + k * static_cast<std::size_t>(sectors_);
-    const std::uint16_t* hints = hints_ + k * static_cast<std::size_t>(sectors_);
-    std::int32_t sector = turns_->middle + turns_->first[low_][k];
-    if (sector < 0) sector += sectors_;
-    if (sector >= sectors_) sector -= sectors_;
-    for (int turn = turns_->first[low_][k]; turn <= turns_->last[high_][k]; ++turn) {
-      if (!(ring[sector] > slope_of_hint(hints[sector])))
-        ring[sector] = std::min(ring[sector], ring_best_[k]);
-      if (++sector == sectors_) sector = 0;
-    }
-  }
+  std::array<float, kRings * 2> best;
+  for (std::size_t k = 0; k < kRings; ++k)
+    for (std::size_t r = first_run_[k]; r < first_run_[k + 1]; ++r) best[r] = ring_best_[k];
+  lower_useless(runs_.data(), best.data(), run_count_, hints_, bounds);
 }
 
 void ReachedCells::lower_closed(float* bounds) const {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/horizon/certified/fan.h"
+#include "core/occlusion/certified/cell_kernels.h"
 #include "core/occlusion/certified/polar_cells.h"
 
 namespace scarp {
@@ -62,9 +63,15 @@ class ReachedCells {
  public:
   /// What is known of the cells of a group from elsewhere.
   struct Known {
-    const float* bounds;         ///< [kRings * sectors]: no higher one is of use
-    const std::uint16_t* least;  ///< [kRings * sectors]: nor one under this, as a slope_hint
+    const float* bounds;          ///< [kRings * sectors]: no higher one is of use
+    const std::uint16_t* least;   ///< [kRings * sectors]: nor one under this, as a slope_hint
+    const std::uint64_t* wanted;  ///< a bit a cell: 0 where bounds are not over least (mark)
   };
+
+  /// Marks the cells of which more than is known is of use, of those that any ray of a fan leads
+  /// to. Bounds only fall, so that a cell that is not marked never will be.
+  /// @param wanted[out]  [kRings * sectors / kCellsMarked]
+  void mark(const Turns& turns, std::int32_t sectors, const Known& known, std::uint64_t* wanted);
 
   /// All cells that rays over a piece lead to.
   /// @param low, high  lanes that the rays pass the group's centre in
@@ -88,13 +95,14 @@ class ReachedCells {
   bool is_promising(float rise, float slope, std::size_t first, std::size_t end) const;
 
   /// Lowers a group's bounds to these. The bounds are those of `known`.
-  void lower(float* bounds) const;
+  void lower(float* bounds);
   /// Where they are not open, that is.
   void lower_closed(float* bounds) const;
 
  private:
   std::size_t size() const { return first_[kRings]; }
   void make_room(std::size_t size);
+  void find_runs();
   /// The outer of the lanes has the least reach.
   const RingRow& forward() const { return rings_->forward[high_ + low_ >= kLanes ? high_ : low_]; }
 
@@ -112,10 +120,12 @@ class ReachedCells {
   std::int32_t sectors_ = 0;
   const std::uint16_t* hints_ = nullptr;
   RingRow ring_best_{}, ring_least_{};
+  // The cells of each ring: once, or twice where they go round the end of the row. Of a part of a
+  // piece they are found when they are needed.
+  std::array<CellRun, kRings * 2> runs_{};
+  std::array<std::size_t, kRings + 1> first_run_{};
+  std::size_t run_count_ = 0;
 };
-
-/// A slope in 16 bits, about: the upper half of a float.
-std::uint16_t slope_hint(float slope);
 
 /// Bounds are not worked on to raise them by less than this slope.
 inline constexpr float kSlopeTolerance = 0.001F;
