@@ -1,71 +1,27 @@
 #include <gdal_priv.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
-#include <thread>
 
 #include "cli/loaded_scene.h"
-#include "tests/support/fractal_ground.h"
-#include "tests/support/run_scarp.h"
-#include "tests/support/temp_folder.h"
-#include "tiles/store/checksum.h"
+#include "tests/cli/tiled_terrain.h"
 
 namespace scarp {
 namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
+using test::files_of;
 using test::run_scarp;
 using test::RunResult;
 
 json read_json(const std::string& path) {
   return json::parse(std::ifstream(path));
-}
-
-/// Mountains with a lake of void, 30 m, of a size that no tile divides.
-constexpr int kColumns = 141, kRows = 118;
-std::string write_dem(const std::string& path) {
-  GDALAllRegister();
-  GDALDataset* dataset = GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
-      path.c_str(), kColumns, kRows, 1, GDT_Int16, nullptr);
-  double transform[6] = {400'000, 30, 0, 5'200'000, 0, -30};
-  dataset->SetGeoTransform(transform);
-  OGRSpatialReference crs;
-  crs.SetFromUserInput("EPSG:32632");
-  dataset->SetSpatialRef(&crs);
-  dataset->GetRasterBand(1)->SetNoDataValue(-1);
-  const test::FractalGround ground(3);
-  for (int row = 0; row < kRows; ++row) {
-    std::vector<std::int16_t> heights(kColumns);
-    ground.row(700, 900 + row, heights);
-    for (int column = 0; column < kColumns; ++column)
-      if ((column - 80) * (column - 80) + (row - 70) * (row - 70) < 120)
-        heights[static_cast<std::size_t>(column)] = -1;
-    EXPECT_EQ(dataset->GetRasterBand(1)->RasterIO(GF_Write, 0, row, kColumns, 1, heights.data(),
-                                                  kColumns, 1, GDT_Int16, 0, 0),
-              CE_None);
-  }
-  GDALClose(dataset);
-  return path;
-}
-
-/// Size and checksum of every file of a scene, but those that hold times.
-std::map<std::string, std::string> files_of(const std::string& scene) {
-  std::map<std::string, std::string> files;
-  for (const auto& entry : fs::recursive_directory_iterator(scene)) {
-    const std::string name = entry.path().lexically_relative(scene).generic_string();
-    if (entry.is_regular_file() && name != "report.json" && name != "scene.json")
-      files[name] = to_hex(digest_of_file(entry.path().string()).checksum);
-  }
-  return files;
 }
 
 /// Values of a raster by the map place of its samples.
@@ -90,30 +46,7 @@ std::map<std::pair<long, long>, int> values_by_place(const std::string& path) {
   return by_place;
 }
 
-constexpr char kQuick[] =
-    " --max-error 6 --fans 32 --patch 2 --group-triangles 40 --min-group-triangles 10 "
-    "--tile-samples 64 --observer=401900,5198200,40 ";
-
-/// One DEM and one scene of 4 x 3 tiles for all tests that only read it.
-class TiledBuild : public testing::Test {
- protected:
-  static void SetUpTestSuite() {
-    folder_ = new test::TempFolder;
-    dem_ = write_dem(folder_->path("dem.tif"));
-    scene_ = folder_->path("tiled.scene");
-    built_ = run_scarp("$SCARP build " + dem_ + " -o " + scene_ + kQuick + "--json");
-  }
-  static void TearDownTestSuite() { delete folder_; }
-  void SetUp() override { ASSERT_EQ(built_.exit_code, 0) << built_.errors; }
-
-  static std::string build(const std::string& scene) {
-    return "$SCARP build " + dem_ + " -o " + scene + kQuick;
-  }
-
-  static inline test::TempFolder* folder_ = nullptr;
-  static inline std::string dem_, scene_;
-  static inline RunResult built_;
-};
+class TiledBuild : public test::TiledTerrain {};
 
 TEST_F(TiledBuild, ReportTellsTilesLevelsAndWhatRefinementSaved) {
   const json report = json::parse(built_.output);
@@ -172,15 +105,18 @@ TEST_F(TiledBuild, GroupsLayerIsTheGroupsOfTheScene) {
   GDALDataset* groups = GDALDataset::Open((scene_ + "/layers/groups.tif").c_str());
   ASSERT_NE(groups, nullptr);
   EXPECT_STREQ(groups->GetMetadataItem("LAYOUT", "IMAGE_STRUCTURE"), "COG");
-  std::vector<std::int32_t> values(static_cast<std::size_t>(kColumns) * kRows);
-  ASSERT_EQ(groups->GetRasterBand(1)->RasterIO(GF_Read, 0, 0, kColumns, kRows, values.data(),
-                                               kColumns, kRows, GDT_Int32, 0, 0),
+  std::vector<std::int32_t> values(static_cast<std::size_t>(test::kTiledColumns) *
+                                   test::kTiledRows);
+  ASSERT_EQ(groups->GetRasterBand(1)->RasterIO(GF_Read, 0, 0, test::kTiledColumns, test::kTiledRows,
+                                               values.data(), test::kTiledColumns, test::kTiledRows,
+                                               GDT_Int32, 0, 0),
             CE_None);
   GDALClose(groups);
   const json report = read_json(scene_ + "/report.json");
   std::map<std::int32_t, int> samples_of;
   for (const std::int32_t value : values) ++samples_of[value];
-  EXPECT_EQ(samples_of[-9999], kColumns * kRows - report["raster"]["known_samples"].get<int>() +
+  EXPECT_EQ(samples_of[-9999], test::kTiledColumns * test::kTiledRows -
+                                   report["raster"]["known_samples"].get<int>() +
                                    report["mesh"]["lost_samples"].get<int>());
   EXPECT_GT(samples_of.rbegin()->first, report["groups"]["groups"].get<std::int32_t>() * 9 / 10);
   EXPECT_LT(samples_of.rbegin()->first, report["groups"]["groups"].get<std::int32_t>());
@@ -249,7 +185,7 @@ TEST_F(TiledBuild, ViewshedReadsTheTilesThatItReaches) {
   const json all = json::parse(run_scarp(ask + " -o " + all_file).output);
   EXPECT_EQ(all["tiles_read"], 6);
   EXPECT_LE(near["tiles_read"], 4);
-  EXPECT_LT(near["columns"], kColumns);
+  EXPECT_LT(near["columns"], test::kTiledColumns);
   const auto whole = values_by_place(all_file);
   std::size_t unlike = 0;
   for (const auto& [place, value] : values_by_place(scene_ + "/layers/viewshed.tif"))
@@ -299,128 +235,6 @@ TEST_F(TiledBuild, StepsOfAPlanMakeTheSameSceneInAnyOrderThatItAllows) {
   EXPECT_EQ(files_of(scene), files_of(scene_));
   EXPECT_EQ(step(3).exit_code, 0);
   EXPECT_FALSE(fs::exists(scene + ".part"));
-}
-
-/// Starts a build and kills it after a while. @return whether it was killed
-bool build_and_kill(const std::string& command, std::chrono::milliseconds after) {
-  const pid_t child = fork();
-  if (child == 0) {
-    const std::string exec = "SCARP='" SCARP_PROGRAM "'; exec " + command + " >/dev/null 2>&1";
-    execl("/bin/sh", "sh", "-c", exec.c_str(), nullptr);
-    _exit(127);
-  }
-  std::this_thread::sleep_for(after);
-  kill(child, SIGKILL);
-  int status = 0;
-  waitpid(child, &status, 0);
-  return WIFSIGNALED(status);
-}
-
-std::map<std::string, fs::file_time_type> records_in(const std::string& folder) {
-  std::map<std::string, fs::file_time_type> records;
-  std::error_code none;
-  for (const auto& entry : fs::directory_iterator(folder, none))
-    if (entry.path().extension() == ".json")
-      records[entry.path().filename().string()] = fs::last_write_time(entry.path(), none);
-  return records;
-}
-
-TEST_F(TiledBuild, KilledAndResumedItMakesTheSameSceneAndRepeatsNothing) {
-  // SCARP_PROVE_KILLS=50 is the long form.
-  const char* asked = std::getenv("SCARP_PROVE_KILLS");
-  const int kills = asked ? std::atoi(asked) : 4;
-  const std::string scene = folder_->path("killed.scene");
-  const auto begun = std::chrono::steady_clock::now();
-  ASSERT_EQ(run_scarp(build(scene)).exit_code, 0);
-  const auto whole = std::chrono::duration_cast<std::chrono::milliseconds>(
-      std::chrono::steady_clock::now() - begun);
-  fs::remove_all(scene);
-  std::uint64_t random = 1;
-  int killed = 0;
-  while (killed < kills) {
-    random = random * 6364136223846793005U + 1442695040888963407U;
-    const auto after = whole * static_cast<int>((random >> 33) % 1000) / 1000 / (asked ? 1 : 2);
-    const auto before = records_in(scene + ".part/work/steps");
-    if (build_and_kill(build(scene) + "--resume", after)) {
-      ++killed;
-      for (const auto& [record, time] : records_in(scene + ".part/work/steps"))
-        if (before.contains(record)) {
-          EXPECT_EQ(before.at(record), time) << record;
-        }
-      if (fs::exists(scene + "/scene.json")) {
-        EXPECT_EQ(files_of(scene), files_of(scene_));
-        fs::remove_all(scene);
-      }
-    } else {
-      EXPECT_EQ(files_of(scene), files_of(scene_));
-      fs::remove_all(scene);
-    }
-  }
-  const RunResult last = run_scarp(build(scene) + "--resume");
-  EXPECT_EQ(last.exit_code, 0) << last.errors;
-  EXPECT_EQ(files_of(scene), files_of(scene_));
-  EXPECT_EQ(run_scarp("$SCARP check " + scene).exit_code, 0);
-  EXPECT_FALSE(fs::exists(scene + ".part"));
-  fs::remove_all(scene);
-}
-
-TEST_F(TiledBuild, AFullDiskIsOneLineAndWhatWasFinishedIsGoneOnWith) {
-  const std::string scene = folder_->path("full.scene");
-  // Tiles fit under the limit, the pictures do not.
-  const RunResult full = run_scarp("trap '' XFSZ; ulimit -f 700; " + build(scene));
-  EXPECT_EQ(full.exit_code, 1);
-  EXPECT_EQ(std::count(full.errors.begin(), full.errors.end(), '\n'), 1) << full.errors;
-  EXPECT_NE(full.errors.find("--resume"), std::string::npos) << full.errors;
-  EXPECT_FALSE(fs::exists(scene));
-  const RunResult anew = run_scarp(build(scene));
-  EXPECT_EQ(anew.exit_code, 1);
-  EXPECT_NE(anew.errors.find("unfinished build"), std::string::npos) << anew.errors;
-  const RunResult otherwise = run_scarp(build(scene) + "--resume --seed 2");
-  EXPECT_EQ(otherwise.exit_code, 1);
-  EXPECT_NE(otherwise.errors.find("other options"), std::string::npos) << otherwise.errors;
-  const auto before = records_in(scene + ".part/work/steps");
-  EXPECT_EQ(before.size(), 17U);  // all but the last
-  ASSERT_EQ(run_scarp(build(scene) + "--resume").exit_code, 0);
-  EXPECT_EQ(files_of(scene), files_of(scene_));
-  EXPECT_EQ(run_scarp(build(scene) + "--resume").exit_code, 0);  // nothing left to do
-}
-
-TEST_F(TiledBuild, ASourceThatGoesOrChangesMidwayIsNamed) {
-  const std::string dem = folder_->path("going.tif"), scene = folder_->path("going.scene");
-  const std::string plan = folder_->path("going.json");
-  fs::copy_file(dem_, dem);
-  const std::string build = "$SCARP build " + dem + " -o " + scene + kQuick;
-  ASSERT_EQ(run_scarp(build + "--plan " + plan).exit_code, 0);
-  const auto step = [&](int i) {
-    return run_scarp("$SCARP build --plan " + plan + " --step " + std::to_string(i));
-  };
-  ASSERT_EQ(step(0).exit_code, 0);
-  ASSERT_EQ(step(1).exit_code, 0);
-  fs::rename(dem, dem + ".away");
-  const RunResult gone = step(2);
-  EXPECT_EQ(gone.exit_code, 1);
-  EXPECT_NE(gone.errors.find("no such file"), std::string::npos) << gone.errors;
-  fs::copy_file(dem_, dem);  // the same bytes, but who knows
-  const RunResult changed = step(2);
-  EXPECT_EQ(changed.exit_code, 1);
-  EXPECT_NE(changed.errors.find("other sources"), std::string::npos) << changed.errors;
-  fs::remove(dem);
-  fs::rename(dem + ".away", dem);
-  EXPECT_EQ(step(1).output.find("was done already") != std::string::npos, true);
-  EXPECT_EQ(step(2).exit_code, 0);
-  ASSERT_EQ(run_scarp(build + "--resume").exit_code, 0);
-  EXPECT_EQ(files_of(scene), files_of(scene_));
-}
-
-TEST_F(TiledBuild, TwoBuildsOfOneSceneAreOneTooMany) {
-  const std::string scene = folder_->path("twice.scene");
-  fs::create_directory(scene + ".part");
-  // Holds the folder's lock as a running build does.
-  const RunResult second = run_scarp("flock '" + scene + ".part' -c \"" SCARP_PROGRAM " build " +
-                                     dem_ + " -o " + scene + kQuick + "\"");
-  EXPECT_EQ(second.exit_code, 1);
-  EXPECT_NE(second.errors.find("another process is building"), std::string::npos) << second.errors;
-  EXPECT_EQ(std::count(second.errors.begin(), second.errors.end(), '\n'), 1);
 }
 
 TEST_F(TiledBuild, CommandsThatTakeAllOfAScenePayHeedToMemory) {
