@@ -4,6 +4,8 @@
 //                       [--tile-samples 1024] [--dem FILE] [--folder DIR] [--json FILE]
 // Makes its own terrain (tests/support/fractal_ground.h), millions of samples each; --dem takes a
 // file instead. Each build runs the program itself, so that the kernel counts its memory alone.
+// --max-error default, --fans default and --tile-samples default leave a choice to the program.
+// Ends in the table of docs/scale.md.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <gdal_priv.h>
@@ -137,6 +139,18 @@ Options parse(int argc, char** argv) {
   return options;
 }
 
+/// The options of a build that are not left to the program.
+std::vector<std::string> chosen(const Options& options) {
+  std::vector<std::string> arguments = {"--memory", options.memory};
+  const auto add = [&](const char* name, const std::string& value) {
+    if (value != "default") arguments.insert(arguments.end(), {name, value});
+  };
+  add("--max-error", options.max_error);
+  add("--fans", options.fans);
+  add("--tile-samples", options.tile_samples);
+  return arguments;
+}
+
 /// Bytes of a scene's files by their endings: tin, groups, range, tif, png, json.
 std::map<std::string, std::uint64_t> bytes_by_kind(const std::string& path) {
   std::map<std::string, std::uint64_t> bytes;
@@ -151,43 +165,21 @@ double sum_of(const std::map<std::string, std::uint64_t>& bytes) {
   return sum;
 }
 
-/// One size: a row of the table.
-void measure(const Options& options, const std::string& dem, const std::string& folder,
-             json& rows) {
-  const std::string scene = folder + "/bench.scene", out = folder + "/out";
-  const Ran build = run_program({"build", dem, "-o", scene, "--overwrite", "--json", "--memory",
-                                 options.memory, "--max-error", options.max_error, "--fans",
-                                 options.fans, "--tile-samples", options.tile_samples},
-                                out);
-  const json report = json::parse(build.output);
-  const double samples =
-      report["raster"]["columns"].get<double>() * report["raster"]["rows"].get<double>();
-  const json raster = report["raster"];
-  const json description = json::parse(std::ifstream(scene + "/scene.json"));
-  const auto& g = description["raster"]["geotransform"];
-  const std::string camera = fmt::format(
-      "{},{},200", g[0].get<double>() + g[1].get<double>() * raster["columns"].get<double>() / 2,
-      g[3].get<double>() + g[5].get<double>() * raster["rows"].get<double>() / 2);
-  const Ran cull =
-      run_program({"cull", scene, "--camera=" + camera, "--max-distance", "10000", "--json"}, out);
-  const json answer = json::parse(cull.output);
-  const std::map<std::string, std::uint64_t> bytes = bytes_by_kind(scene);
-  fmt::print("{:8.1f} {:9} {:9.1f} {:9.2f} {:9.2f} {:9.0f} {:9.2f} {:9.1f} {:5}/{:<5} {:8.1f}\n",
-             samples / 1e6, report["mesh"]["triangles"].get<std::uint64_t>(), build.wall_s,
-             1e6 * build.wall_s / samples, 1e6 * build.cpu_s / samples, build.peak_mib,
-             sum_of(bytes) / samples, 1e3 * answer["open_s"].get<double>(),
-             answer["tiles_read"].get<int>(), answer["tiles"].get<int>(),
-             1e3 * answer["answer_s"].get<double>());
-  rows.push_back({{"samples", samples},
-                  {"seconds", build.wall_s},
-                  {"cpu_seconds", build.cpu_s},
-                  {"peak_mib", build.peak_mib},
-                  {"bytes_a_sample", sum_of(bytes) / samples}});
-  if (!options.json_file.empty()) std::ofstream(options.json_file) << rows.dump(1) << '\n';
-  fmt::print("  bytes a sample:");
-  for (const auto& [kind, count] : bytes)
-    fmt::print(" {} {:.3f}", kind, static_cast<double>(count) / samples);
-  fmt::print("\n");
+/// One question to a finished scene, 10 km around its middle, as JSON.
+struct Asked {
+  Ran ran;
+  json answer;
+};
+
+Asked ask(std::vector<std::string> question, const std::string& out) {
+  question.insert(question.end(), {"--max-distance", "10000", "--json"});
+  Asked asked;
+  asked.ran = run_program(question, out);
+  asked.answer = json::parse(asked.ran.output);
+  return asked;
+}
+
+void print_build(const json& report, const Ran& build) {
   for (const json& stage : report["stages"])
     fmt::print("  {:<10} {:9.1f} s {:7.0f} MiB\n", stage["name"].get<std::string>(),
                stage["seconds"].get<double>(), stage["peak_memory_bytes"].get<double>() / 0x1p20);
@@ -197,7 +189,82 @@ void measure(const Options& options, const std::string& dem, const std::string& 
       100 * report["refinement"]["saved_of_mesh"].get<double>(),
       100 * report["refinement"].value("saved_of_seen_ground", 0.0),
       report["bytes_read"].get<double>() / 0x1p20, report["bytes_written"].get<double>() / 0x1p20);
+  for (const json& row : report["verify"])
+    fmt::print("  of groups hidden from {:g} m, {:.2f} are culled; {} of {} falsely\n",
+               row["eye_height_m"].get<double>(), row["of_hidden"].get<double>(),
+               row["falsely_culled"].get<std::uint64_t>(), row["triangles"].get<std::uint64_t>());
+  fmt::print("  {:.0f} s, {:.2f} us a sample by the clock\n", build.wall_s,
+             1e6 * build.wall_s / report["raster"]["known_samples"].get<double>());
+}
+
+/// One size: a row of the table.
+json measure(const Options& options, const std::string& dem, const std::string& folder) {
+  const std::string scene = folder + "/bench.scene", out = folder + "/out";
+  std::vector<std::string> command = {"build", dem, "-o", scene, "--overwrite", "--json"};
+  const std::vector<std::string> choice = chosen(options);
+  command.insert(command.end(), choice.begin(), choice.end());
+  const Ran build = run_program(command, out);
+  const json report = json::parse(build.output);
+  const json raster = report["raster"];
+  const double columns = raster["columns"].get<double>(), rows = raster["rows"].get<double>();
+  const double samples = columns * rows;
+  fmt::print("{:.1f} million samples, {} x {}\n", samples / 1e6, columns, rows);
+  print_build(report, build);
+
+  const std::map<std::string, std::uint64_t> bytes = bytes_by_kind(scene);
+  fmt::print("  bytes a sample:");
+  for (const auto& [kind, count] : bytes)
+    fmt::print(" {} {:.3f}", kind, static_cast<double>(count) / samples);
+  fmt::print("\n");
   std::fflush(stdout);
+
+  const json description = json::parse(std::ifstream(scene + "/scene.json"));
+  const auto& g = description["raster"]["geotransform"];
+  const std::string eye =
+      fmt::format("={},{},200", g[0].get<double>() + g[1].get<double>() * columns / 2,
+                  g[3].get<double>() + g[5].get<double>() * rows / 2);
+  const Asked cull = ask({"cull", scene, "--camera" + eye}, out);
+  const Asked viewshed =
+      ask({"viewshed", scene, "--observer" + eye, "-o", folder + "/seen.tif", "--overwrite"}, out);
+  fmt::print("  viewshed of 10 km: {} of {} tiles, {:.2f} s of processor in all;",
+             viewshed.answer["tiles_read"].get<int>(), viewshed.answer["tiles"].get<int>(),
+             viewshed.ran.cpu_s);
+  for (const json& stage : viewshed.answer["stages"])
+    fmt::print(" {} {:.2f} s", stage["name"].get<std::string>(), stage["seconds"].get<double>());
+  fmt::print("\n");
+  std::fflush(stdout);
+  return {{"samples", samples},
+          {"columns", columns},
+          {"rows", rows},
+          {"triangles", report["mesh"]["triangles"]},
+          {"seconds", build.wall_s},
+          {"cpu_seconds", build.cpu_s},
+          {"peak_mib", build.peak_mib},
+          {"bytes_a_sample", sum_of(bytes) / samples},
+          {"png_bytes_a_sample", static_cast<double>(bytes.at(".png")) / samples},
+          {"tiles", cull.answer["tiles"]},
+          {"tiles_read", cull.answer["tiles_read"]},
+          {"open_ms", 1e3 * cull.answer["open_s"].get<double>()},
+          {"answer_ms", 1e3 * cull.answer["answer_s"].get<double>()}};
+}
+
+/// As in docs/scale.md.
+void print_table(const json& rows) {
+  fmt::print(
+      "\n| samples | triangles | processor, us/sample | peak memory, MiB | scene, bytes/sample "
+      "| of that pictures | tiles read by a cull of 10 km | open, ms | answer, ms |\n");
+  fmt::print("|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n");
+  for (const json& row : rows) {
+    const double samples = row["samples"].get<double>();
+    fmt::print(
+        "| {:.1f} million ({} x {}) | {} | {:.2f} | {:.0f} | {:.2f} | {:.2f} | {} of {} | "
+        "{:.0f} | {:.0f} |\n",
+        samples / 1e6, row["columns"].get<int>(), row["rows"].get<int>(),
+        row["triangles"].get<std::uint64_t>(), 1e6 * row["cpu_seconds"].get<double>() / samples,
+        row["peak_mib"].get<double>(), row["bytes_a_sample"].get<double>(),
+        row["png_bytes_a_sample"].get<double>(), row["tiles_read"].get<int>(),
+        row["tiles"].get<int>(), row["open_ms"].get<double>(), row["answer_ms"].get<double>());
+  }
 }
 
 }  // namespace
@@ -209,20 +276,22 @@ int main(int argc, char** argv) try {
   fs::create_directories(folder);
   fmt::print("--memory {} --max-error {} --fans {} --tile-samples {}\n", options.memory,
              options.max_error, options.fans, options.tile_samples);
-  fmt::print("{:>8} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>11} {:>8}\n", "samples",
-             "triangles", "build, s", "us/sample", "cpu us/s", "peak MiB", "B/sample", "open, ms",
-             "tiles read", "cull, ms");
   json rows = json::array();
+  const auto add = [&](const std::string& dem) {
+    rows.push_back(measure(options, dem, folder));
+    if (!options.json_file.empty()) std::ofstream(options.json_file) << rows.dump(1) << '\n';
+  };
   if (!options.dem.empty()) {
-    measure(options, options.dem, folder, rows);
-    return 0;
+    add(options.dem);
+  } else {
+    for (const double millions : options.millions) {
+      const int side = static_cast<int>(std::lround(std::sqrt(millions * 1e6)));
+      const std::string dem = fmt::format("{}/fractal-{}.tif", folder, side);
+      if (!fs::exists(dem)) write_fractal_dem(dem, side, side, 1);
+      add(dem);
+    }
   }
-  for (const double millions : options.millions) {
-    const int side = static_cast<int>(std::lround(std::sqrt(millions * 1e6)));
-    const std::string dem = fmt::format("{}/fractal-{}.tif", folder, side);
-    if (!fs::exists(dem)) write_fractal_dem(dem, side, side, 1);
-    measure(options, dem, folder, rows);
-  }
+  print_table(rows);
 } catch (const std::exception& failure) {
   fmt::print(stderr, "{}\n", failure.what());
   return 1;
