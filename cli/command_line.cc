@@ -447,9 +447,9 @@ void add_fly(CLI::App& app, FlyOptions& o, std::function<int()>& run) {
   c->add_option("--seed", o.seed, "Where such a path begins; 1 unless given")->excludes(path);
   c->add_option("--methods", o.methods, "Some of them only, separated by commas")
       ->delimiter(',')
-      ->check(CLI::IsMember({"frustum", "thesis", "certified", "cells", "law-tan", "hzb", "mask",
-                             "mask-plain", "hom", "hom-0.7", "hybrid", "volume-scan", "lod-query",
-                             "multi-frame", "stop-and-wait"}));
+      ->check(CLI::IsMember({"frustum", "thesis", "certified", "swept", "cells", "law-tan", "hzb",
+                             "mask", "mask-plain", "hom", "hom-0.7", "hybrid", "volume-scan",
+                             "lod-query", "multi-frame", "stop-and-wait"}));
   c->add_option("--width", o.width_px, "Of the pictures, pixels, 16:9; 640 unless given")
       ->check(CLI::Range(16, 8192));
   c->add_option("--field-of-view", o.field_of_view_deg, "Vertical, degrees; 45 unless given")

@@ -140,7 +140,7 @@ class Runner {
     const Shot& shot = plan_.shots[frame];
     CullingMethod& method = *contenders_[contender].method;
     FrameCounts counts;
-    const Stopwatch finding;
+    const ProcessorStopwatch finding;
     const CullingAnswer answer = method.visible(camera_of(shot));
     const Frustum frustum(look_at(shot.view, shot.width_px, shot.height_px));
     const std::vector<GroupIndex> groups = in_picture(batches_, frustum, answer.visible_groups);
@@ -149,7 +149,7 @@ class Runner {
       draws_mover.push_back(frustum.may_show(box) && method.may_show(box));
     counts.find_ms = finding.ms();
     counts.groups = static_cast<std::uint32_t>(groups.size());
-    const Stopwatch drawing;
+    const ProcessorStopwatch drawing;
     painter_.gather(groups);
     for (std::uint32_t m = 0; m < draws_mover.size(); ++m) {
       counts.missed_movers += whole.mover_seen[m] && !draws_mover[m];

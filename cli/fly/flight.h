@@ -37,8 +37,9 @@ struct FrameCounts {
   std::uint32_t movers = 0;         ///< that it draws
   std::uint32_t missed_movers = 0;
   std::uint64_t drawn = 0;  ///< triangles of those groups, and the orphans
-  double find_ms = 0;       ///< to find the groups, and which of them are in the picture
-  double draw_ms = 0;       ///< to draw them at scale 1
+  /// Processor time, of all threads: to find the groups, and which of them are in the picture.
+  double find_ms = 0;
+  double draw_ms = 0;  ///< the same, to draw them at scale 1
   std::array<std::uint64_t, kPictureScales.size()> wrong_px{};
   /// Of those: an exact ray through the pixel's centre reaches what was left out.
   std::array<std::uint64_t, kPictureScales.size()> judged_wrong_px{};

@@ -9,7 +9,7 @@
 namespace scarp {
 namespace {
 
-/// Groups whose cells are found before the first of them is looked up, so that the look-ups
+/// Groups in view whose cells are found before the first of them is looked up, so that the look-ups
 /// overlap.
 constexpr std::size_t kBlock = 64;
 
@@ -33,16 +33,18 @@ class ViewWedge {
     ahead_x_ = std::cos(middle_rad), ahead_y_ = std::sin(middle_rad);
   }
 
+  /// Without branches: which groups are in view cannot be foretold.
   bool may_show(const CertifiedGroup& group) const {
-    if (shows_all_) return true;
     const double x_m = group.centre_x_m - eye_.x_m, y_m = group.centre_y_m - eye_.y_m;
     const double reach_m =
         static_cast<double>(group.radius_m) + (std::abs(x_m) + std::abs(y_m)) * kViewRounding;
     const bool left_of_from = from_x_ * y_m - from_y_ * x_m >= -reach_m;
     const bool right_of_to = to_y_ * x_m - to_x_ * y_m >= -reach_m;
-    if (!is_convex_) return left_of_from || right_of_to;
-    return left_of_from && right_of_to && ahead_x_ * x_m + ahead_y_ * y_m >= -reach_m;
+    const bool is_ahead = ahead_x_ * x_m + ahead_y_ * y_m >= -reach_m;
+    return is_convex_ ? left_of_from & right_of_to & is_ahead : left_of_from | right_of_to;
   }
+
+  bool shows_all() const { return shows_all_; }
 
  private:
   Position eye_;
@@ -50,17 +52,30 @@ class ViewWedge {
   double from_x_, from_y_, to_x_, to_y_, ahead_x_, ahead_y_;
 };
 
-/// A camera as many groups see it: arrays, so that the arithmetic runs side by side.
+/// A camera as some groups see it: arrays, so that the arithmetic runs side by side.
 struct Block {
+  std::size_t count = 0;
+  std::array<GroupIndex, kBlock> group;
   std::array<float, kBlock> x_m, y_m, rise_m, distance_m;
   std::array<std::int32_t, kBlock> ring, sector;
 };
 
-void place_camera(const CertifiedRegions& regions, const Position& eye, std::size_t first,
-                  std::size_t count, Block& block) {
+/// Fills a block with the next groups in view.
+/// @return the first group that was not looked at
+std::size_t fill(const CertifiedRegions& regions, const ViewWedge* wedge, std::size_t next,
+                 Block& block) {
+  block.count = 0;
+  for (; next < regions.groups.size() && block.count < kBlock; ++next) {
+    block.group[block.count] = static_cast<GroupIndex>(next);
+    block.count += wedge == nullptr || wedge->may_show(regions.groups[next]);
+  }
+  return next;
+}
+
+void place_camera(const CertifiedRegions& regions, const Position& eye, Block& block) {
   std::array<float, kBlock> ring_square;
-  for (std::size_t i = 0; i < count; ++i) {
-    const CertifiedGroup& g = regions.groups[first + i];
+  for (std::size_t i = 0; i < block.count; ++i) {
+    const CertifiedGroup& g = regions.groups[block.group[i]];
     block.x_m[i] = static_cast<float>(eye.x_m - g.centre_x_m);
     block.y_m[i] = static_cast<float>(eye.y_m - g.centre_y_m);
     block.rise_m[i] = static_cast<float>(eye.z_m - g.height_m);
@@ -68,7 +83,7 @@ void place_camera(const CertifiedRegions& regions, const Position& eye, std::siz
     ring_square[i] = square_m2 / (g.radius_m * g.radius_m);
     block.distance_m[i] = std::sqrt(square_m2);
   }
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::size_t i = 0; i < block.count; ++i) {
     // Within the circle there is no ring, and perhaps no direction.
     const bool is_near = !(ring_square[i] >= 1);
     block.ring[i] = is_near ? -1 : ring_of(regions.layout, ring_square[i]);
@@ -86,19 +101,19 @@ std::size_t CertifiedCulling::visible_into(const Camera& camera,
   const ViewWedge wedge(camera.eye, camera.view.value_or(ViewRange{0, 100}));
   Block block;
   std::size_t found = 0;
-  for (std::size_t first = 0; first < regions_.groups.size(); first += kBlock) {
-    const std::size_t count = std::min(kBlock, regions_.groups.size() - first);
-    place_camera(regions_, camera.eye, first, count, block);
-    for (std::size_t i = 0; i < count; ++i)
-      __builtin_prefetch(&regions_.at(static_cast<GroupIndex>(first + i), block.sector[i]));
-    for (std::size_t i = 0; i < count; ++i) {
-      const auto group = static_cast<GroupIndex>(first + i);
-      const CertifiedGroup& g = regions_.groups[group];
-      const bool is_hidden =
-          block.ring[i] >= 0 && hides_at(g, regions_.at(group, block.sector[i]), block.ring[i],
-                                         block.distance_m[i], block.rise_m[i]);
+  for (std::size_t next = 0; next < regions_.groups.size();) {
+    // The view first: it costs a few multiplications, a look-up mostly a miss of the cache.
+    next = fill(regions_, wedge.shows_all() ? nullptr : &wedge, next, block);
+    place_camera(regions_, camera.eye, block);
+    for (std::size_t i = 0; i < block.count; ++i)
+      __builtin_prefetch(&regions_.at(block.group[i], block.sector[i]));
+    for (std::size_t i = 0; i < block.count; ++i) {
+      const GroupIndex group = block.group[i];
+      const bool is_hidden = block.ring[i] >= 0 &&
+                             hides_at(regions_.groups[group], regions_.at(group, block.sector[i]),
+                                      block.ring[i], block.distance_m[i], block.rise_m[i]);
       visible[found] = group;
-      found += !is_hidden && (!camera.view || wedge.may_show(g));
+      found += !is_hidden;
     }
   }
   return found;

@@ -26,6 +26,16 @@ class GroupBatches {
         .subspan(first_triangle_[group], first_triangle_[group + 1] - first_triangle_[group]);
   }
 
+  /// A batch's vertices, and the corners of its triangles among them, in the order of triangles().
+  std::span<const Position> vertices(GroupIndex group) const {
+    return std::span(vertices_).subspan(first_vertex_[group],
+                                        first_vertex_[group + 1] - first_vertex_[group]);
+  }
+  std::span<const std::array<VertexIndex, 3>> corners(GroupIndex group) const {
+    return std::span(corners_).subspan(first_triangle_[group],
+                                       first_triangle_[group + 1] - first_triangle_[group]);
+  }
+
   /// Some batches, laid out for rasterise: object numbers are those of the TIN's triangles.
   struct Drawing {
     std::vector<Position> vertices;

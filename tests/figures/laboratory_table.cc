@@ -1,6 +1,8 @@
 // Repeats the tables and curves of two papers on a scene, as Markdown:
 //   laboratory_table wang SCENE ROUTE [FRAMES]         Wang, Agarwal and Har-Peled 2001
 //   laboratory_table grundhoefer SCENE ROUTE [FRAMES]  Grundhöfer et al. 2006
+// and says what certified regions draw beyond what is seen (laboratory_table left SCENE ROUTE
+// [FRAMES [SEEDS]]). Times are processor time.
 
 #include <fmt/format.h>
 
@@ -17,9 +19,12 @@
 #include "cli/stage_clock.h"
 #include "cli/stopwatch.h"
 #include "core/culling/box_tree.h"
+#include "core/culling/certified_culling.h"
 #include "core/culling/image_culling.h"
 #include "core/culling/mask_culling.h"
 #include "core/culling/query_culling.h"
+#include "core/sight/triangle_sight.h"
+#include "core/threads/parallel_for.h"
 
 namespace {
 
@@ -47,10 +52,10 @@ struct Laboratory {
   BoxTree tree;
   FlightPlan plan;
 
-  Laboratory(const std::string& path, Route route, int frames)
+  Laboratory(const std::string& path, Route route, int frames, std::uint64_t seed = 1)
       : scene(path, {machine_memory_bytes()}), batches(scene.tin, scene.groups), tree(batches) {
     const GeoFrame::Placer placer(scene.frame);
-    for (const Waypoint& w : find_path(scene, route, frames, 1))
+    for (const Waypoint& w : find_path(scene, route, frames, seed))
       plan.shots.push_back(shot_at(placer, w, {}));
   }
 
@@ -86,7 +91,7 @@ Errors errors_of(const Flight& flight, std::size_t contender) {
 double frames_a_second_of_all(const Laboratory& lab) {
   GroupBatches::Drawing all;
   for (GroupIndex g = 0; g <= lab.batches.groups(); ++g) lab.batches.add_to(g, all);
-  const Stopwatch watch;
+  const ProcessorStopwatch watch;
   int frames = 0;
   for (std::size_t i = 0; i < lab.plan.shots.size(); i += 8, ++frames) {
     const Shot& shot = lab.plan.shots[i];
@@ -100,7 +105,7 @@ double frames_a_second_of_all(const Laboratory& lab) {
 void wang(const Laboratory& lab) {
   std::array<double, 5> step_ms{};
   int masks = 0;
-  Stopwatch since;
+  ProcessorStopwatch since;
   std::size_t running = step_ms.size();
   const std::array<int, 8> margins = {1, 2, 4, 6, 8, 12, 20, 32};
   constexpr std::size_t kPaperMargin = 3;  // in margins: 6 pixels
@@ -117,7 +122,7 @@ void wang(const Laboratory& lab) {
         if (running < step_ms.size()) step_ms[running] += since.ms();
         running = static_cast<std::size_t>(step);
         masks += step == MaskStep::kDone;
-        since = Stopwatch();
+        since = ProcessorStopwatch();
       };
     contenders.push_back(
         {fmt::format("{}", margins[m]), false, 0, 0,
@@ -270,6 +275,88 @@ void grundhoefer(const Laboratory& lab) {
              100 * static_cast<double>(flight.counts[5][middle].wrong_px[0]) / pixels);
 }
 
+// ---- What is left
+
+/// Triangles a frame in groups that certified regions draw, by why.
+struct Left {
+  double with_pixel = 0;   ///< show a pixel of the picture at twice its size
+  double seen = 0;         ///< exactly seen, by a triangle that meets the picture, but by no pixel
+  double seen_beside = 0;  ///< exactly seen, but beside the picture
+  double around_camera = 0;  ///< the camera is within the group's circle, where regions say nothing
+  double not_proved = 0;     ///< all others
+};
+
+Left left_of(const Laboratory& lab, const Shot& shot) {
+  const CertifiedRegions& regions = lab.scene.groups.certified;
+  const Frustum frustum(look_at(shot.view, shot.width_px, shot.height_px));
+  std::vector<GroupIndex> drawn;
+  GroupBatches::Drawing drawing;
+  for (const GroupIndex g : CertifiedCulling(regions).visible(camera_of(shot)).visible_groups)
+    if (frustum.may_show(lab.batches.box(g))) {
+      drawn.push_back(g);
+      lab.batches.add_to(g, drawing);
+    }
+  // Nothing that is seen is left out, so that this is the picture of everything.
+  Target picture = empty_target(2 * shot.width_px, 2 * shot.height_px);
+  rasterise(picture,
+            project_all(look_at(shot.view, picture.width_px, picture.height_px), drawing.vertices),
+            drawing.triangles, drawing.objects);
+  std::vector<std::uint8_t> has_pixel(lab.batches.groups(), 0);
+  for (const std::uint32_t object : picture.object)
+    if (object != kNone && lab.scene.groups.group_of_triangle[object] != kNone)
+      has_pixel[lab.scene.groups.group_of_triangle[object]] = 1;
+  Left left;
+  for (const GroupIndex g : drawn) {
+    const auto triangles = lab.batches.triangles(g);
+    const auto count = static_cast<double>(triangles.size());
+    if (has_pixel[g]) {
+      left.with_pixel += count;
+      continue;
+    }
+    const auto sights = judge_each(lab.scene.index, shot.view.eye, triangles);
+    bool is_seen = false, is_in_picture = false;
+    for (std::size_t i = 0; i < triangles.size(); ++i) {
+      if (sights[i] != TriangleSight::kVisible) continue;
+      is_seen = true;
+      std::array<Position, 3> corners;
+      for (std::size_t c = 0; c < 3; ++c)
+        corners[c] = lab.scene.tin.vertices[lab.scene.tin.triangles[triangles[i]][c]];
+      is_in_picture |= frustum.may_show(bounds_of(corners));
+    }
+    const CertifiedGroup& group = regions.groups[g];
+    const bool is_around = std::hypot(shot.view.eye.x_m - group.centre_x_m,
+                                      shot.view.eye.y_m - group.centre_y_m) <= group.radius_m;
+    (is_in_picture ? left.seen
+     : is_seen     ? left.seen_beside
+     : is_around   ? left.around_camera
+                   : left.not_proved) += count;
+  }
+  return left;
+}
+
+void left(const std::string& path, Route route, int frames, int seeds) {
+  fmt::print(
+      "| seed | frames | with a pixel | seen by less | seen beside the picture | around the camera "
+      "| not proved | times those with a pixel | times those seen |\n"
+      "|---|---|---|---|---|---|---|---|---|\n");
+  for (int seed = 1; seed <= seeds; ++seed) {
+    const Laboratory lab(path, route, frames, static_cast<std::uint64_t>(seed));
+    Left sum;
+    for (const Shot& shot : lab.plan.shots) {
+      const Left frame = left_of(lab, shot);
+      sum.with_pixel += frame.with_pixel, sum.seen += frame.seen;
+      sum.seen_beside += frame.seen_beside, sum.around_camera += frame.around_camera;
+      sum.not_proved += frame.not_proved;
+    }
+    const double n = static_cast<double>(lab.plan.shots.size());
+    const double seen = sum.with_pixel + sum.seen;
+    const double all = seen + sum.seen_beside + sum.around_camera + sum.not_proved;
+    fmt::print("| {} | {} | {:.0f} | {:.0f} | {:.0f} | {:.0f} | {:.0f} | {:.2f} | {:.2f} |\n", seed,
+               lab.plan.shots.size(), sum.with_pixel / n, sum.seen / n, sum.seen_beside / n,
+               sum.around_camera / n, sum.not_proved / n, all / sum.with_pixel, all / seen);
+  }
+}
+
 Route route_named(const std::string& name) {
   if (name == "street") return Route::kStreet;
   if (name == "drive") return Route::kDrive;
@@ -280,12 +367,20 @@ Route route_named(const std::string& name) {
 }  // namespace
 
 int main(int count, char** arguments) {
-  const std::string paper = count > 1 ? arguments[1] : "";
-  if (count < 4 || (paper != "wang" && paper != "grundhoefer")) {
-    fmt::print(stderr, "usage: laboratory_table wang|grundhoefer SCENE ROUTE [FRAMES]\n");
+  const std::string what = count > 1 ? arguments[1] : "";
+  if (count < 4 || (what != "wang" && what != "grundhoefer" && what != "left")) {
+    fmt::print(stderr,
+               "usage: laboratory_table wang|grundhoefer|left SCENE ROUTE [FRAMES [SEEDS]]\n");
     return 2;
   }
-  const Laboratory lab(arguments[2], route_named(arguments[3]),
-                       count > 4 ? std::max(2, std::atoi(arguments[4])) : 100);
-  (paper == "wang" ? wang : grundhoefer)(lab);
+  // Others may use the other processors: what is measured is what one thread takes.
+  set_thread_count(1);
+  const Route route = route_named(arguments[3]);
+  const int frames = count > 4 ? std::max(2, std::atoi(arguments[4])) : 100;
+  if (what == "left") {
+    left(arguments[2], route, frames, count > 5 ? std::atoi(arguments[5]) : 1);
+    return 0;
+  }
+  const Laboratory lab(arguments[2], route, frames);
+  (what == "wang" ? wang : grundhoefer)(lab);
 }
