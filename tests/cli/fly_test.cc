@@ -68,8 +68,8 @@ TEST_F(FlyCommand, MethodsThatClaimItShowNoWrongPixelAndLeaveSomethingOut) {
       EXPECT_EQ(method["missed_groups"], 0) << name;
     }
     EXPECT_EQ(methods,
-              (std::set<std::string>{"frustum", "thesis", "certified", "cells", "law-tan", "hzb",
-                                     "mask", "mask-plain", "hom", "hom-0.7", "hybrid",
+              (std::set<std::string>{"frustum", "thesis", "certified", "swept", "cells", "law-tan",
+                                     "hzb", "mask", "mask-plain", "hom", "hom-0.7", "hybrid",
                                      "volume-scan", "lod-query", "multi-frame", "stop-and-wait"}));
   }
 }
