@@ -2,8 +2,43 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+
+#include "core/threads/for_each_target.h"
 
 namespace scarp {
+
+namespace {
+
+/// Strips and what they hold.
+struct Strips {
+  double low_v_m, width_m, low_u_m;
+  std::int32_t first, last;
+};
+
+/// For each edge the strips whose middle lines it crosses, from strips.first on: [first, end),
+/// first == end where there is none.
+SCARP_FOR_EACH_TARGET
+void find_strips(const RidgeEdges::Edge* edges, std::size_t count, const FanPlace* vertices,
+                 const Strips& strips, std::int32_t* first, std::int32_t* end) {
+  const Strips in = strips;
+  for (std::size_t e = 0; e < count; ++e) {
+    const FanPlace& p = vertices[edges[e][0]];
+    const FanPlace& q = vertices[edges[e][1]];
+    const bool is_ahead = !(p.u_m < in.low_u_m && q.u_m < in.low_u_m);
+    const double low_m = p.v_m < q.v_m ? p.v_m : q.v_m, high_m = p.v_m < q.v_m ? q.v_m : p.v_m;
+    const auto low = static_cast<std::int32_t>(std::ceil((low_m - in.low_v_m) / in.width_m - 0.5));
+    const auto high =
+        static_cast<std::int32_t>(std::floor((high_m - in.low_v_m) / in.width_m - 0.5));
+    const std::int32_t from = low > in.first ? low : in.first;
+    const std::int32_t to = high < in.last ? high : in.last;
+    const bool is_crossed = is_ahead & (from <= to) & (low_m < high_m);
+    first[e] = is_crossed ? from - in.first : 0;
+    end[e] = is_crossed ? to + 1 - in.first : 0;
+  }
+}
+
+}  // namespace
 
 RidgeEdges ridge_edges_of(const Tin& tin) {
   RidgeEdges ridges;
@@ -43,33 +78,35 @@ void Ridges::cross(const RidgeEdges& ridges, const FanView& view, double width_m
   first_strip_ = strip_of(range.low_v_m);
   const std::ptrdiff_t last_strip = strip_of(range.high_v_m);
   const auto strips = static_cast<std::size_t>(last_strip - first_strip_ + 1);
-  first_.assign(strips + 1, 0);
-  /// Calls visit(strip, u, z) for the middle lines that an edge crosses.
-  const auto visit_crossings = [&](const RidgeEdges::Edge& edge, auto visit) {
-    const FanPlace& p = view.vertices[edge[0]];
-    const FanPlace& q = view.vertices[edge[1]];
-    if (p.u_m < range.low_u_m && q.u_m < range.low_u_m) return;
-    const double low = (std::min(p.v_m, q.v_m) - low_v_m_) / width_m - 0.5;
-    const double high = (std::max(p.v_m, q.v_m) - low_v_m_) / width_m - 0.5;
-    const auto last = std::min(last_strip, static_cast<std::ptrdiff_t>(std::floor(high)));
-    for (auto s = std::max(first_strip_, static_cast<std::ptrdiff_t>(std::ceil(low))); s <= last;
-         ++s) {
-      if (!(p.v_m != q.v_m)) continue;
-      const double v_m = low_v_m_ + (static_cast<double>(s) + 0.5) * width_m;
-      const double share = (v_m - p.v_m) / (q.v_m - p.v_m);
-      visit(static_cast<std::size_t>(s - first_strip_), p.u_m + share * (q.u_m - p.u_m),
-            p.z_m + share * (q.z_m - p.z_m));
-    }
-  };
-  for (const auto& edge : ridges.edges)
-    visit_crossings(edge, [&](std::size_t s, double, double) { ++first_[s + 1]; });
-  for (std::size_t s = 0; s < strips; ++s) first_[s + 1] += first_[s];
+  first_edge_strip_.resize(ridges.edges.size()), end_edge_strip_.resize(ridges.edges.size());
+  find_strips(ridges.edges.data(), ridges.edges.size(), view.vertices.data(),
+              {low_v_m_, width_m, range.low_u_m, static_cast<std::int32_t>(first_strip_),
+               static_cast<std::int32_t>(last_strip)},
+              first_edge_strip_.data(), end_edge_strip_.data());
+  // How many more cross a strip than the one before; then how many cross it and all before.
+  first_.assign(strips + 2, 0);
+  for (std::size_t e = 0; e < ridges.edges.size(); ++e) {
+    ++first_[static_cast<std::size_t>(first_edge_strip_[e]) + 1];
+    --first_[static_cast<std::size_t>(end_edge_strip_[e]) + 1];
+  }
+  first_.pop_back();
+  std::partial_sum(first_.begin(), first_.end(), first_.begin());
+  std::partial_sum(first_.begin(), first_.end(), first_.begin());
   crossings_.resize(first_.back());
-  std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
-  for (std::uint32_t e = 0; e < ridges.edges.size(); ++e)
-    visit_crossings(ridges.edges[e], [&](std::size_t s, double u_m, double z_m) {
-      crossings_[next[s]++] = {static_cast<float>(u_m), static_cast<float>(z_m), e};
-    });
+  next_.assign(first_.begin(), first_.end() - 1);
+  for (std::uint32_t e = 0; e < ridges.edges.size(); ++e) {
+    const std::int32_t end = end_edge_strip_[e];
+    if (first_edge_strip_[e] == end) continue;
+    const FanPlace& p = view.vertices[ridges.edges[e][0]];
+    const FanPlace& q = view.vertices[ridges.edges[e][1]];
+    for (std::int32_t s = first_edge_strip_[e]; s < end; ++s) {
+      const double v_m = low_v_m_ + (static_cast<double>(first_strip_ + s) + 0.5) * width_m;
+      const double share = (v_m - p.v_m) / (q.v_m - p.v_m);
+      crossings_[next_[static_cast<std::size_t>(s)]++] = {
+          static_cast<float>(p.u_m + share * (q.u_m - p.u_m)),
+          static_cast<float>(p.z_m + share * (q.z_m - p.z_m)), e};
+    }
+  }
   for (std::size_t s = 0; s < strips; ++s)
     std::sort(crossings_.begin() + static_cast<std::ptrdiff_t>(first_[s]),
               crossings_.begin() + static_cast<std::ptrdiff_t>(first_[s + 1]),

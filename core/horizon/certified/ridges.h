@@ -58,6 +58,9 @@ class Ridges {
   std::ptrdiff_t first_strip_ = 0;
   std::vector<std::size_t> first_;  // [strips + 1]
   std::vector<RidgeCrossing> crossings_;
+  // For cross: the strips of each edge, and where a strip's next crossing goes.
+  std::vector<std::int32_t> first_edge_strip_, end_edge_strip_;
+  std::vector<std::size_t> next_;
 };
 
 }  // namespace scarp

@@ -36,12 +36,6 @@ class Chain {
  private:
   const FanPlace& place(VertexIndex v) const { return view_.vertices[v]; }
 
-  /// Whether an edge leads across the fan; p has the lesser v.
-  bool is_across(const FanPlace& p, const FanPlace& q) const {
-    const double least = std::max(view_.fan.tan_half, kLeastTurn);
-    return q.v_m - p.v_m > std::abs(q.u_m - p.u_m) * least + 8 * view_.error_m;
-  }
-
   bool is_rising(const FanPlace& p, const FanPlace& q) const {
     return q.v_m - p.v_m > 8 * view_.error_m;
   }
@@ -71,28 +65,35 @@ class Chain {
   /// @param left  not to these
   std::optional<VertexIndex> highest_from(VertexIndex v, int side,
                                           std::span<const VertexIndex> left) const {
-    const FanPlace& p = place(v);
-    std::optional<VertexIndex> best, other_best;
+    const FanPlace p = place(v);
+    const double least_m = 8 * view_.error_m;
+    VertexIndex best = kNone, other_best = kNone;
     double best_rise = -HUGE_VAL, other_best_rise = -HUGE_VAL;
+    // Without branches, but for those that are nearly never taken: edges follow no pattern.
     for (const VertexIndex other : ridges_.around_of(v)) {
       const FanPlace& q = place(other);
-      if (!(side > 0 ? is_rising(p, q) : is_rising(q, p))) continue;
-      if (std::find(left.begin(), left.end(), other) != left.end()) continue;
-      const double above_m = q.z_m - p.z_m - slope_ * (q.u_m - p.u_m);
-      if (!(side > 0 ? is_across(p, q) : is_across(q, p))) {
-        if (above_m > other_best_rise) other_best = other, other_best_rise = above_m;
-        continue;
-      }
-      const double rise = above_m / std::abs(q.v_m - p.v_m);
-      if (rise > best_rise) best = other, best_rise = rise;
+      if (!left.empty() && std::find(left.begin(), left.end(), other) != left.end()) continue;
+      const double du_m = q.u_m - p.u_m, dv_m = side > 0 ? q.v_m - p.v_m : p.v_m - q.v_m;
+      const double above_m = q.z_m - p.z_m - slope_ * du_m;
+      const bool is_across = dv_m > std::abs(du_m) * least_turn_ + least_m;
+      const bool is_rising = dv_m > least_m;
+      const double rise = is_across ? above_m / dv_m : -HUGE_VAL;
+      const double other_rise = is_rising & !is_across ? above_m : -HUGE_VAL;
+      best = rise > best_rise ? other : best;
+      best_rise = rise > best_rise ? rise : best_rise;
+      other_best = other_rise > other_best_rise ? other : other_best;
+      other_best_rise = other_rise > other_best_rise ? other_rise : other_best_rise;
     }
-    return best ? best : other_best;
+    const VertexIndex found = best != kNone ? best : other_best;
+    return found != kNone ? std::optional(found) : std::nullopt;
   }
 
   const RidgeEdges& ridges_;
   const FanView& view_;
   const Beam& beam_;
   double slope_;
+  /// Chains should not run nearly along the fan.
+  const double least_turn_ = std::max(view_.fan.tan_half, kLeastTurn);
 };
 
 /// The plane that an edge of the chain holds, with the better of two lines along rays.

@@ -27,7 +27,7 @@ constexpr std::int32_t kFansAtOnce = 4;
 constexpr float kEverything = std::numeric_limits<float>::infinity();
 
 /// Groups that are worked on one after another, in the same memory.
-constexpr std::size_t kGroupsAtOnce = 4;
+constexpr std::size_t kGroupsAtOnce = 16;
 
 /// An edge is halved this often at most.
 constexpr std::size_t kMostHalvings = 6;
@@ -102,12 +102,15 @@ class Bounding {
       });
       parallel_for((groups() + kGroupsAtOnce - 1) / kGroupsAtOnce, [&](std::size_t chunk) {
         Workspace work;
-        const std::size_t end = std::min(groups(), (chunk + 1) * kGroupsAtOnce);
-        for (std::size_t group = chunk * kGroupsAtOnce; group < end; ++group) {
-          number_corners(static_cast<GroupIndex>(group), work);
-          for (std::size_t i = 0; i < count; ++i)
-            look_along(views[i], ridges[i], rings, turns[i], static_cast<GroupIndex>(group), work);
-        }
+        const std::size_t first = chunk * kGroupsAtOnce;
+        const std::size_t end = std::min(groups(), first + kGroupsAtOnce);
+        for (std::size_t group = first; group < end; ++group)
+          number_corners(static_cast<GroupIndex>(group), work.numbered[group - first]);
+        // Neighbours look at the same ridges: a fan is taken for all of them while it is at hand.
+        for (std::size_t i = 0; i < count; ++i)
+          for (std::size_t group = first; group < end; ++group)
+            look_along(views[i], ridges[i], rings, turns[i], static_cast<GroupIndex>(group),
+                       work.numbered[group - first], work);
       });
       if (progress) progress(static_cast<double>(begin + kFansAtOnce) / options_.fans);
     }
@@ -212,11 +215,16 @@ class Bounding {
     bool is_tried = false, is_walled = false;
   };
 
-  /// Memory of a Look, and what all fans have in common of a group.
+  /// The crests and borders of a group, by the numbers of their corners.
+  struct NumberedGroup {
+    std::vector<VertexIndex> corners;
+    std::vector<FanCrests::Ends> crests, borders;
+  };
+
+  /// Memory that Looks take one after another.
   struct Workspace {
-    std::vector<VertexIndex> corners;  // of the group
+    std::array<NumberedGroup, kGroupsAtOnce> numbered;
     FanCrests crests;
-    std::vector<FanCrests::Ends> borders;
     std::vector<double> low_u_m, low_v_m, high_v_m;  // of crests
     std::vector<std::uint32_t> candidates;
     std::vector<FanEdge> exits;
@@ -252,30 +260,28 @@ class Bounding {
     ReachedCells& reached() { return work.reached_by_depth[depth]; }
   };
 
-  /// Numbers the corners of a group's crests.
-  void number_corners(GroupIndex group, Workspace& work) const {
-    std::vector<VertexIndex>& corners = work.corners;
-    corners.clear();
+  void number_corners(GroupIndex group, NumberedGroup& numbered) const {
+    std::vector<VertexIndex>& corners = numbered.corners;
     for (const auto& edge : edges_.crests_of(group))
       corners.insert(corners.end(), edge.begin(), edge.end());
     std::sort(corners.begin(), corners.end());
     corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
-    const auto corner_of = [&](VertexIndex vertex) {
-      return static_cast<std::uint32_t>(std::lower_bound(corners.begin(), corners.end(), vertex) -
-                                        corners.begin());
+    const auto ends_of = [&](const GroupEdges::Edge& edge) {
+      FanCrests::Ends ends;
+      for (std::size_t i = 0; i < 2; ++i)
+        ends[i] = static_cast<std::uint32_t>(
+            std::lower_bound(corners.begin(), corners.end(), edge[i]) - corners.begin());
+      return ends;
     };
-    work.crests.ends.clear();
-    for (const auto& edge : edges_.crests_of(group))
-      work.crests.ends.push_back({corner_of(edge[0]), corner_of(edge[1])});
-    work.borders.clear();
-    for (const auto& edge : edges_.borders_of(group))
-      work.borders.push_back({corner_of(edge[0]), corner_of(edge[1])});
+    for (const auto& edge : edges_.crests_of(group)) numbered.crests.push_back(ends_of(edge));
+    for (const auto& edge : edges_.borders_of(group)) numbered.borders.push_back(ends_of(edge));
   }
 
   /// Places a group's corners, crests and exits in the fan's frame.
-  static void place_group(Look& look) {
+  static void place_group(const NumberedGroup& numbered, Look& look) {
     Workspace& work = look.work;
-    look.crests.place_corners(look.view, work.corners);
+    look.crests.place_corners(look.view, numbered.corners);
+    look.crests.ends = numbered.crests;
     const std::size_t size = look.crests.ends.size();
     work.low_u_m.resize(size), work.low_v_m.resize(size), work.high_v_m.resize(size);
     for (std::size_t i = 0; i < size; ++i) {
@@ -285,7 +291,7 @@ class Bounding {
       work.high_v_m[i] = std::max(look.crests.v_m[a], look.crests.v_m[b]);
     }
     look.exits.clear();
-    for (const auto& [a, b] : work.borders) {
+    for (const auto& [a, b] : numbered.borders) {
       const FanEdge exit{look.crests.corner(a), look.crests.corner(b), a, b};
       if (!is_entry(look.view, exit)) look.exits.push_back(exit);
     }
@@ -296,7 +302,8 @@ class Bounding {
   }
 
   void look_along(const FanView& view, const Ridges& ridges, const RingTable& rings,
-                  const Turns& turns, GroupIndex group, Workspace& work) {
+                  const Turns& turns, GroupIndex group, const NumberedGroup& numbered,
+                  Workspace& work) {
     const Circle& circle = bounds_.circle[group];
     work.wanted.resize(kRings / kCellsMarked * static_cast<std::size_t>(options_.sectors));
     const std::size_t first_cell =
@@ -315,7 +322,7 @@ class Bounding {
               work};
     look.centre =
         place_in(view.fan, circle.x_m - origin_x_m_, circle.y_m - origin_y_m_, look.height_m);
-    place_group(look);
+    place_group(numbered, look);
     look.reached().mark(turns, options_.sectors, look.known, work.wanted.data());
     for (const FanEdge& edge : look.exits) {
       behind(look, edge);

@@ -100,18 +100,16 @@ class TargetList {
 
   /// The part of a crest from one share of it to another.
   void add(const FanCrests::Ends& ends, double from, double to) {
-    const bool touches_a = ends[0] == border_.from || ends[1] == border_.from;
-    const bool touches_b = ends[0] == border_.to || ends[1] == border_.to;
     const FanPlace a = crests_.corner(ends[0]), b = crests_.corner(ends[1]);
     for (const double share : {from, to}) {
       const FanPlace place = between(a, b, share);
       if (is_same(place, a)) {
-        add(place, ends[0], touches_a, touches_b);
+        add(place, ends[0], ends);
       } else if (is_same(place, b)) {
-        add(place, ends[1], touches_a, touches_b);
+        add(place, ends[1], ends);
       } else {
         targets_.places.push_back(place);
-        if (!is_of_border(place, touches_a, touches_b)) targets_.under_plane.push_back(place);
+        if (!is_of_border(place, ends)) targets_.under_plane.push_back(place);
       }
     }
   }
@@ -127,20 +125,24 @@ class TargetList {
 
  private:
   /// A place at a corner.
-  void add(const FanPlace& place, std::uint32_t corner, bool touches_a, bool touches_b) {
+  void add(const FanPlace& place, std::uint32_t corner, const FanCrests::Ends& ends) {
+    // Of a border's own corner some crests say nothing, and others do.
+    if (targets_.held[corner] == targets_.turn) return;
     if (std::exchange(targets_.listed[corner], targets_.turn) != targets_.turn)
       targets_.places.push_back(place);
-    // Of a border's own corner some crests say nothing, and others do.
-    if (targets_.held[corner] == targets_.turn || is_of_border(place, touches_a, touches_b)) return;
+    if (is_of_border(place, ends)) return;
     targets_.held[corner] = targets_.turn;
     targets_.under_plane.push_back(place);
   }
 
   /// The end that a crest has in common with the border says nothing: the ground around it rises
   /// from the border as it does further back, where other crests bound it.
-  bool is_of_border(const FanPlace& place, bool touches_a, bool touches_b) const {
-    return (touches_a || touches_b) && plane_.is_too_near(place) &&
-           ((touches_a && is_at(border_.a, place)) || (touches_b && is_at(border_.b, place)));
+  bool is_of_border(const FanPlace& place, const FanCrests::Ends& ends) const {
+    if (!plane_.is_too_near(place)) return false;
+    const auto is_common = [&](std::uint32_t corner, const FanPlace& end) {
+      return (ends[0] == corner || ends[1] == corner) && is_at(end, place);
+    };
+    return is_common(border_.from, border_.a) || is_common(border_.to, border_.b);
   }
 
   bool is_at(const FanPlace& end, const FanPlace& place) const {

@@ -19,7 +19,7 @@ struct FanCrests {
   using Ends = std::array<std::uint32_t, 2>;  ///< corners
 
   std::vector<double> u_m, v_m, z_m;  ///< [corners, and repeated up to a multiple of kPlacesAtOnce]
-  std::vector<Ends> ends;             ///< [crests]
+  std::span<const Ends> ends;         ///< [crests]
 
   FanPlace corner(std::uint32_t i) const { return {u_m[i], v_m[i], z_m[i]}; }
 

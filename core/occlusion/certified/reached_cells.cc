@@ -78,6 +78,27 @@ bool is_any_raised(const float* best, const float* wanted, const float* inverse,
   return any != 0;
 }
 
+/// The runs of cells from one turn to another, ring by ring, up to the end of the row; then what
+/// goes on from its beginning.
+/// @return whether there is any of that
+SCARP_FOR_EACH_TARGET
+bool lay_runs(const std::int16_t* first_turn, const std::int16_t* last_turn, std::int32_t middle,
+              std::int32_t sectors, CellRun* runs) {
+  std::int32_t round = 0;
+  for (std::int32_t k = 0; k < kRings; ++k) {
+    const std::int32_t turns = last_turn[k] - first_turn[k] + 1, count = turns > 0 ? turns : 0;
+    const std::int32_t turn = middle + first_turn[k];
+    const std::int32_t sector = turn + (turn < 0 ? sectors : 0) - (turn >= sectors ? sectors : 0);
+    const std::int32_t to_end = count < sectors - sector ? count : sectors - sector;
+    const std::int32_t row = k * sectors;
+    runs[k] = {static_cast<std::uint32_t>(row + sector), static_cast<std::uint32_t>(to_end)};
+    runs[k + kRings] = {static_cast<std::uint32_t>(row),
+                        static_cast<std::uint32_t>(count - to_end)};
+    round |= count - to_end;
+  }
+  return round != 0;
+}
+
 }  // namespace
 
 RingTable::RingTable(const PolarLayout& layout, const Fan& fan) {
@@ -155,33 +176,21 @@ void ReachedCells::make_room(std::size_t size) {
 }
 
 void ReachedCells::find_runs() {
-  run_count_ = 0;
-  const auto &first_turn = turns_->first[low_], &last_turn = turns_->last[high_];
-  for (std::size_t k = 0; k < kRings; ++k) {
-    first_run_[k] = run_count_;
-    const std::int32_t count = last_turn[k] - first_turn[k] + 1;
-    if (count <= 0) continue;
-    std::int32_t begin = turns_->middle + first_turn[k];
-    if (begin < 0) begin += sectors_;
-    if (begin >= sectors_) begin -= sectors_;
-    const auto row = static_cast<std::uint32_t>(k) * static_cast<std::uint32_t>(sectors_);
-    const std::int32_t to_end = std::min(count, sectors_ - begin);
-    runs_[run_count_++] = {row + static_cast<std::uint32_t>(begin),
-                           static_cast<std::uint32_t>(to_end)};
-    if (to_end < count) runs_[run_count_++] = {row, static_cast<std::uint32_t>(count - to_end)};
-  }
-  first_run_[kRings] = run_count_;
+  go_round_ = lay_runs(turns_->first[low_].data(), turns_->last[high_].data(), turns_->middle,
+                       sectors_, runs_.data());
+  has_runs_ = true;
 }
 
 void ReachedCells::mark(const Turns& turns, std::int32_t sectors, const Known& known,
                         std::uint64_t* wanted) {
   turns_ = &turns, low_ = 0, high_ = kLanes - 1, sectors_ = sectors;
   find_runs();
-  for (std::size_t r = 0; r < run_count_; ++r) {
+  for (std::size_t r = 0; r < run_count(); ++r) {
     const std::uint32_t begin = runs_[r].begin / kCellsMarked * kCellsMarked;
     const std::uint32_t end = runs_[r].begin + runs_[r].count;
-    mark_wanted(known.bounds, known.least,
-                {begin, (end - begin + kCellsMarked - 1) / kCellsMarked * kCellsMarked}, wanted);
+    if (runs_[r].count > 0)
+      mark_wanted(known.bounds, known.least,
+                  {begin, (end - begin + kCellsMarked - 1) / kCellsMarked * kCellsMarked}, wanted);
   }
 }
 
@@ -194,14 +203,14 @@ void ReachedCells::reach(const RingTable& rings, const Turns& turns,
   ring_best_.fill(kNothing);
   find_runs();
   std::size_t most = 0;
-  for (std::size_t r = 0; r < run_count_; ++r) most += runs_[r].count;
+  for (std::size_t r = 0; r < run_count(); ++r) most += runs_[r].count;
   make_room(most);
   const RingRow& forward_row = forward();
   std::uint32_t wanted = 0;
   for (std::size_t k = 0; k < kRings; ++k) {
     first_[k] = wanted;
     std::int32_t turn = turns.first[low][k];
-    for (std::size_t r = first_run_[k]; r < first_run_[k + 1]; ++r) {
+    for (std::size_t r = k; r < run_count(); r += kRings) {
       const CellRun run = runs_[r];
       visit_marked(known.wanted, run, [&](std::uint32_t cell) {
         const float bound = known.bounds[cell];
@@ -227,7 +236,7 @@ void ReachedCells::reach_part(const ReachedCells& whole, std::size_t low, std::s
   make_room(whole.size());
   rings_ = whole.rings_, turns_ = whole.turns_, low_ = low, high_ = high;
   sectors_ = whole.sectors_, hints_ = whole.hints_, ring_best_ = whole.ring_best_;
-  run_count_ = 0;
+  has_runs_ = false;
   const auto& first_turn = turns_->first[low];
   const auto& last_turn = turns_->last[high];
   std::uint32_t size = 0;
@@ -278,12 +287,10 @@ bool ReachedCells::is_promising(float rise, float slope, std::size_t first, std:
 }
 
 void ReachedCells::lower(float* bounds) {
-  if (run_count_ == 0) find_runs();
+  if (!has_runs_) find_runs();
   for (std::size_t i = 0; i < size(); ++i) bounds[cell_[i]] = std::min(bounds[cell_[i]], best_[i]);
-  std::array<float, kRings * 2> best;
-  for (std::size_t k = 0; k < kRings; ++k)
-    for (std::size_t r = first_run_[k]; r < first_run_[k + 1]; ++r) best[r] = ring_best_[k];
-  lower_useless(runs_.data(), best.data(), run_count_, hints_, bounds);
+  for (std::size_t r = 0; r < run_count(); r += kRings)
+    lower_useless(runs_.data() + r, ring_best_.data(), kRings, hints_, bounds);
 }
 
 void ReachedCells::lower_closed(float* bounds) const {

@@ -120,11 +120,11 @@ class ReachedCells {
   std::int32_t sectors_ = 0;
   const std::uint16_t* hints_ = nullptr;
   RingRow ring_best_{}, ring_least_{};
-  // The cells of each ring: once, or twice where they go round the end of the row. Of a part of a
-  // piece they are found when they are needed.
+  // The cells of each ring, then what of them goes round the end of the row. Of a part of a piece
+  // they are found when they are needed.
   std::array<CellRun, kRings * 2> runs_{};
-  std::array<std::size_t, kRings + 1> first_run_{};
-  std::size_t run_count_ = 0;
+  bool has_runs_ = false, go_round_ = false;
+  std::size_t run_count() const { return go_round_ ? kRings * 2 : kRings; }
 };
 
 /// Bounds are not worked on to raise them by less than this slope.

@@ -22,6 +22,7 @@ struct Patch {
   Tin tin;
   std::vector<GroupIndex> group_of_triangle;
   FanView view;
+  std::vector<FanCrests::Ends> ends;
   FanCrests crests;  // every vertex is a corner
   std::vector<FanEdge> borders;
 
@@ -55,7 +56,8 @@ struct Patch {
     std::vector<VertexIndex> corners(tin.vertices.size());
     std::iota(corners.begin(), corners.end(), 0U);
     crests.place_corners(view, corners);
-    for (const auto& edge : edges.crests_of(0)) crests.ends.push_back({edge[0], edge[1]});
+    for (const auto& edge : edges.crests_of(0)) ends.push_back({edge[0], edge[1]});
+    crests.ends = ends;
     for (const auto& edge : edges.borders_of(0)) borders.push_back(in_fan(edge));
   }
 
