@@ -180,7 +180,7 @@ class Planner {
   /// Pictures, or the tiles that are judged or looked over at once.
   std::uint64_t finish_bytes() const {
     const double triangles =
-        std::min(static_cast<double>(kMostPreviewTriangles),
+        std::min(static_cast<double>(kMostDrawnTriangles),
                  2.0 * scheme_.columns() * static_cast<double>(scheme_.rows()));
     const double of_pictures =
         static_cast<double>(kBytesOfPictures) + kBytesPerDrawnTriangle * triangles;

@@ -93,7 +93,11 @@ std::string group_raster_file_name(const TileId& tile);
 /// The smallest tiles that there may be, cells along a side.
 inline constexpr std::int32_t kLeastTileSamples = 64;
 
-/// Pictures of a scene are drawn from the finest level that has no more triangles.
+/// `scarp preview` draws the finest level that has no more triangles.
 inline constexpr std::size_t kMostPreviewTriangles = 2'000'000;
+
+/// The same for the pictures that a build makes of several tiles. They have two million pixels and
+/// show no groups, and more triangles would take more memory than any other step.
+inline constexpr std::size_t kMostDrawnTriangles = 500'000;
 
 }  // namespace scarp

@@ -221,7 +221,7 @@ class Finish {
       }
       // Near the root of a narrow scene there may be no tile: the next finer level has all.
       const bool is_last = level == 0 || scheme.tiles(level - 1).empty();
-      if (triangles > kMostPreviewTriangles && !is_last) continue;
+      if (triangles > kMostDrawnTriangles && !is_last) continue;
       std::vector<Tin> tins;
       for (const TileId& tile : scheme.tiles(level))
         if (const auto file = run_.open(tile_file_name(name_of(tile), "tin")))

@@ -69,10 +69,12 @@ std::size_t steps_at_once(const BuildPlan& plan, const Stretch& stretch) {
   return std::clamp(fitting, std::size_t{1}, static_cast<std::size_t>(thread_count()));
 }
 
-/// GDAL's share of the memory: some rows of blocks of a large file.
-void limit_cache(const BuildPlan& plan) {
-  constexpr std::uint64_t kLeast = 16U << 20, kMost = 256U << 20;
-  limit_raster_cache(std::clamp(plan.options.common.memory_budget_bytes / 8, kLeast, kMost));
+/// GDAL's share of the memory: some rows of blocks of a large file. The last step goes over layers
+/// once, tile by tile.
+void limit_cache(const BuildPlan& plan, StepKind kind) {
+  constexpr std::uint64_t kLeast = 16U << 20;
+  const std::uint64_t most = std::uint64_t{kind == StepKind::kFinish ? 64U : 256U} << 20;
+  limit_raster_cache(std::clamp(plan.options.common.memory_budget_bytes / 8, kLeast, most));
 }
 
 void run_stretch(Workspace& work, const Stretch& stretch, ProgressBar& bar) {
@@ -81,6 +83,7 @@ void run_stretch(Workspace& work, const Stretch& stretch, ProgressBar& bar) {
   for (std::size_t i = stretch.first; i < stretch.end; ++i)
     if (!work.is_done(i)) steps.push_back(i);
   if (steps.empty()) return;
+  limit_cache(plan, plan.steps[stretch.first].kind);
   if (steps.size() == 1) {  // its parts have bars of their own
     run_step(work, steps.front(), [&](const std::string& part) { return bar.stage(part); });
     return;
@@ -101,7 +104,6 @@ void run_stretch(Workspace& work, const Stretch& stretch, ProgressBar& bar) {
 }  // namespace
 
 void run_plan(Workspace& work, ProgressBar& bar) {
-  limit_cache(work.plan());
   for (const Stretch& stretch : stretches_of(work.plan())) run_stretch(work, stretch, bar);
 }
 
@@ -118,7 +120,7 @@ bool run_one_step(Workspace& work, std::size_t step, ProgressBar& bar) {
                             plan.steps[step].name(), before, plan.steps[before].name()));
   };
   std::ranges::for_each(plan.steps[step].after, missing);
-  limit_cache(plan);
+  limit_cache(plan, plan.steps[step].kind);
   run_step(work, step, [&](const std::string& part) { return bar.stage(part); });
   return true;
 }
