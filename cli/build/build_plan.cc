@@ -108,7 +108,7 @@ class Planner {
 
   void add_level(const TileId& tile) {
     const bool above_finest = tile.level + 1 == scheme_.finest_level();
-    PlanStep step{StepKind::kLevel, tile, {}, {}, {}, mesh_bytes(tile), kMeshS * samples_of(tile)};
+    PlanStep step{StepKind::kLevel, tile, {}, {}, {}, level_bytes(tile), kMeshS * samples_of(tile)};
     for (const TileId& finer : scheme_.finer_around(tile)) {
       step.inputs.push_back(samples_file_name(finer));
       step.inputs.push_back(tile_file(finer, "tin"));
@@ -170,6 +170,12 @@ class Planner {
   }
   std::uint64_t mesh_bytes(const TileId& tile) const {
     return kBytesOfProcess + static_cast<std::uint64_t>(kBytesPerSample * samples_of(tile));
+  }
+  /// Besides its own mesh, those of the four tiles that it is lowered under.
+  std::uint64_t level_bytes(const TileId& tile) const {
+    constexpr double kChildren = 4;
+    return mesh_bytes(tile) + static_cast<std::uint64_t>(kChildren * kBytesPerSeenVertex *
+                                                         kVertexShare * samples_of(tile));
   }
   std::uint64_t groups_bytes(const TileId& tile) const {
     const double seen = static_cast<double>(scheme_.seen_from(tile).size());

@@ -53,15 +53,23 @@ SampleGrid window_from_finer(StepRun& run) {
 }
 
 /// Surfaces of the tiles under a coarse one and beside those: their meshes, or what hides of them.
+/// Of the twelve beside, only what the coarse tile's edges run over stays in memory.
 class FinerGround {
  public:
   FinerGround(StepRun& run, bool occluders) {
-    for (const TileId& id : run.plan().scheme.finer_around(run.tile())) {
+    const TileScheme& scheme = run.plan().scheme;
+    const TileWindow window = scheme.window_with_halo(run.tile());
+    for (const TileId& id : scheme.finer_around(run.tile())) {
       const auto file =
           run.open(occluders ? occluder_file_name(id) : tile_file_name(name_of(id), "tin"));
       if (!file) continue;
       ids_.push_back(id);
       meshes_.push_back(read_sampled_tin(*file));
+      SampledTin& mesh = meshes_.back();
+      if (scheme.parent(id) == run.tile()) continue;
+      Occluder near =
+          reaching_into({id, &mesh.tin, mesh.sample_of_vertex}, scheme.columns(), window);
+      mesh = {std::move(near.tin), std::move(near.sample_of_vertex)};
     }
   }
 
@@ -77,20 +85,30 @@ class FinerGround {
   std::vector<SampledTin> meshes_;
 };
 
-/// How far this level lies from the finest: from the next one, and what that one has gathered.
-SurfaceGap gap_from_finest(StepRun& run, const SeenTile& coarse, const FinerGround& finer) {
-  const TileScheme& scheme = run.plan().scheme;
+/// How far the levels under a tile have gathered to lie from the finest.
+SurfaceGap gap_of_children(const StepRun& run) {
   SurfaceGap gathered;
-  if (coarse.id.level + 1 < scheme.finest_level()) {
-    for (const TileId& child : scheme.children(coarse.id)) {
-      const nlohmann::json facts = run.facts_of(StepKind::kLevel, child);
-      if (!facts.contains("above_m")) continue;
-      gathered.above_m = std::max(gathered.above_m, facts["above_m"].get<double>());
-      gathered.below_m = std::max(gathered.below_m, facts["below_m"].get<double>());
-    }
+  for (const TileId& child : run.plan().scheme.children(run.tile())) {
+    const nlohmann::json facts = run.facts_of(StepKind::kLevel, child);
+    if (!facts.contains("above_m")) continue;
+    gathered.above_m = std::max(gathered.above_m, facts["above_m"].get<double>());
+    gathered.below_m = std::max(gathered.below_m, facts["below_m"].get<double>());
   }
-  const SurfaceGap gap = gap_of(scheme, coarse, finer.tiles());
-  return {gap.above_m + gathered.above_m, gap.below_m + gathered.below_m};
+  return gathered;
+}
+
+/// The occluder of a tile, with how far its mesh lies from the finest level: under the finest
+/// meshes both are found at once, higher up meshes are compared with meshes and lowered under
+/// occluders.
+Occluder occluder_and_gap(StepRun& run, const SeenTile& coarse) {
+  const TileScheme& scheme = run.plan().scheme;
+  if (coarse.id.level + 1 == scheme.finest_level())
+    return occluder_of(scheme, coarse, FinerGround(run, false).tiles());
+  const SurfaceGap gap = gap_of(scheme, coarse, FinerGround(run, false).tiles());
+  const SurfaceGap gathered = gap_of_children(run);
+  Occluder occluder = occluder_of(scheme, coarse, FinerGround(run, true).tiles());
+  occluder.gap = {gap.above_m + gathered.above_m, gap.below_m + gathered.below_m};
+  return occluder;
 }
 
 }  // namespace
@@ -99,9 +117,9 @@ void level_of_tile(StepRun& run) {
   const BuildPlan& plan = run.plan();
   const TileId tile = run.tile();
   run.part("levels", [&](const Progress& progress) {
-    const SampleGrid grid = window_from_finer(run);
-    Mesh mesh = mesh_tile(plan.scheme, tile, grid, {.max_error_m = plan.max_error_m_of(tile.level)},
-                          progress);
+    SampleGrid grid = window_from_finer(run);
+    const Mesh mesh = mesh_tile(plan.scheme, tile, grid,
+                                {.max_error_m = plan.max_error_m_of(tile.level)}, progress);
     if (tile.level > 0) hand_on_samples(run, grid);
     if (mesh.tin.triangles.empty()) return;
     run.facts = facts_of_mesh(mesh);
@@ -110,13 +128,10 @@ void level_of_tile(StepRun& run) {
                         vertex_heights_m(mesh.tin, *run.open_source().dem().frame),
                         Existing::kReplace);
     });
-    const SeenTile coarse{tile, &mesh.tin, mesh.sample_of_vertex};
-    FinerGround finer(run, false);
-    const SurfaceGap gap = gap_from_finest(run, coarse, finer);
-    run.facts["above_m"] = gap.above_m;
-    run.facts["below_m"] = gap.below_m;
-    if (tile.level + 1 < plan.scheme.finest_level()) finer = FinerGround(run, true);
-    const Occluder occluder = occluder_of(plan.scheme, coarse, finer.tiles());
+    grid = {};
+    const Occluder occluder = occluder_and_gap(run, {tile, &mesh.tin, mesh.sample_of_vertex});
+    run.facts["above_m"] = occluder.gap.above_m;
+    run.facts["below_m"] = occluder.gap.below_m;
     if (occluder.tin.triangles.empty()) return;
     run.make(occluder_file_name(tile), "occluder", [&](const std::string& path) {
       write_tin(path, occluder.tin, occluder.sample_of_vertex, Existing::kReplace);

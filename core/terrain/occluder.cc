@@ -197,6 +197,15 @@ std::vector<Comparison> compare(const Tin& coarse, const Tin& finer) {
   return comparisons;
 }
 
+SurfaceGap greatest_gap(std::span<const Comparison> comparisons) {
+  SurfaceGap gap;
+  for (const Comparison& found : comparisons) {
+    gap.above_m = std::max(gap.above_m, found.gap.above_m);
+    gap.below_m = std::max(gap.below_m, found.gap.below_m);
+  }
+  return gap;
+}
+
 /// Triangles that `keeps` keeps, and what remains of the vertices and neighbours.
 template <class Keeps>
 Occluder part_of(const Tin& tin, std::span<const std::int64_t> sample_of_vertex, Keeps keeps) {
@@ -232,12 +241,7 @@ Occluder part_of(const Tin& tin, std::span<const std::int64_t> sample_of_vertex,
 }  // namespace
 
 SurfaceGap measure_gap(const Tin& coarse, const Tin& finer) {
-  SurfaceGap gap;
-  for (const Comparison& found : compare(coarse, finer)) {
-    gap.above_m = std::max(gap.above_m, found.gap.above_m);
-    gap.below_m = std::max(gap.below_m, found.gap.below_m);
-  }
-  return gap;
+  return greatest_gap(compare(coarse, finer));
 }
 
 std::optional<std::string> check_under(const Tin& lower, const Tin& upper) {
@@ -264,7 +268,9 @@ Occluder lower_under(const Tin& coarse, std::span<const std::int64_t> sample_of_
     const double steps = std::floor((lowered.vertices[v].z_m - lower_by_m[v]) / kLatticeStepM);
     lowered.vertices[v].z_m = steps * kLatticeStepM;
   }
-  return part_of(lowered, sample_of_vertex, is_covered);
+  Occluder occluder = part_of(lowered, sample_of_vertex, is_covered);
+  occluder.gap = greatest_gap(comparisons);
+  return occluder;
 }
 
 namespace {
@@ -293,11 +299,7 @@ Tin surface_under(const TileScheme& scheme, const TileId& tile, std::span<const 
   std::vector<Occluder> near;
   for (const SeenTile& part : finer) {
     assert(part.id.level == tile.level + 1);
-    near.push_back(part_of(*part.tin, part.sample_of_vertex, [&](std::size_t t) {
-      const SampleBox box = box_of(part, scheme.columns(), t);
-      return box.low_column <= window.last_column() && box.high_column >= window.first_column &&
-             box.low_row <= window.last_row() && box.high_row >= window.first_row;
-    }));
+    near.push_back(reaching_into(part, scheme.columns(), window));
   }
   std::vector<const Tin*> parts;
   for (const Occluder& part : near) parts.push_back(&part.tin);
@@ -314,6 +316,14 @@ Occluder occluder_of(const TileScheme& scheme, const SeenTile& coarse,
 SurfaceGap gap_of(const TileScheme& scheme, const SeenTile& coarse,
                   std::span<const SeenTile> finer) {
   return measure_gap(*coarse.tin, surface_under(scheme, coarse.id, finer));
+}
+
+Occluder reaching_into(const SeenTile& tile, std::int32_t columns, const TileWindow& window) {
+  return part_of(*tile.tin, tile.sample_of_vertex, [&](std::size_t t) {
+    const SampleBox box = box_of(tile, columns, t);
+    return box.low_column <= window.last_column() && box.high_column >= window.first_column &&
+           box.low_row <= window.last_row() && box.high_row >= window.first_row;
+  });
 }
 
 Occluder outside(const SeenTile& tile, std::int32_t columns, const TileWindow& covered) {

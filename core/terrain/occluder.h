@@ -34,6 +34,7 @@ struct Occluder {
   Tin tin;
   /// [vertices] as Mesh::sample_of_vertex, rising.
   std::vector<std::int64_t> sample_of_vertex;
+  SurfaceGap gap = {};  ///< of lower_under: how far the surface lay from the finer one before
 };
 
 /// Lowers the vertices of a coarse surface, each as far as the triangles around it demand, until it
@@ -66,7 +67,8 @@ struct SeenTile {
 /// @param coarse  the tile's mesh
 /// @param finer   scheme.finer_around(coarse.id) in its order, meshes of the finest level or
 ///                occluders; those that have no triangle may be left out. The ones beside the tile
-///                matter where grid lines bend or samples are rounded: its edges run over them
+///                matter where grid lines bend or samples are rounded: its edges run over them.
+///                Of those, what reaches into the tile's window with its halo is enough
 /// Side, cost: as lower_under.
 Occluder occluder_of(const TileScheme& scheme, const SeenTile& coarse,
                      std::span<const SeenTile> finer);
@@ -75,6 +77,10 @@ Occluder occluder_of(const TileScheme& scheme, const SeenTile& coarse,
 /// meshes. From the finest it lies no farther than this and the greatest of its children together.
 SurfaceGap gap_of(const TileScheme& scheme, const SeenTile& coarse,
                   std::span<const SeenTile> finer);
+
+/// The part of a surface whose triangles reach into a rectangle of the raster, by their boxes.
+/// @param columns  of the raster
+Occluder reaching_into(const SeenTile& tile, std::int32_t columns, const TileWindow& window);
 
 /// The part of a surface that is not wholly within a rectangle of the raster: what finer tiles hold
 /// need not be seen twice.
