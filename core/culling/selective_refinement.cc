@@ -5,6 +5,9 @@
 #include <cmath>
 #include <limits>
 
+#include "core/culling/drawn_outline.h"
+#include "core/geodesy/predicates.h"
+
 namespace scarp {
 namespace {
 
@@ -234,6 +237,32 @@ SelectiveRefinement::Drawing SelectiveRefinement::draw(
     drawing.objects.push_back(t);
   }
   return drawing;
+}
+
+bool SelectiveRefinement::is_over(const Position& eye, const Drawing& drawing) const {
+  for (const TriangleIndex t : drawing.active) {
+    const auto& [i, j, k] = history_.triangles[t];
+    const Position &a = tin_.vertices[i], &b = tin_.vertices[j], &c = tin_.vertices[k];
+    if (std::min({a.x_m, b.x_m, c.x_m}) > eye.x_m || std::max({a.x_m, b.x_m, c.x_m}) < eye.x_m ||
+        std::min({a.y_m, b.y_m, c.y_m}) > eye.y_m || std::max({a.y_m, b.y_m, c.y_m}) < eye.y_m)
+      continue;
+    if (orient2d(a, b, eye) >= 0 && orient2d(b, c, eye) >= 0 && orient2d(c, a, eye) >= 0)
+      return orient3d(a, b, c, eye) > 0;
+  }
+  return false;
+}
+
+void SelectiveRefinement::leave_out_hidden(const Shot& shot, Drawing& drawing) const {
+  if (!is_over(round_to_lattice(shot.view.eye), drawing)) return;
+  const std::vector<std::uint8_t> is_kept = over_outline(shot, tin_.vertices, drawing.triangles);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < is_kept.size(); ++i) {
+    if (!is_kept[i]) continue;
+    drawing.triangles[kept] = drawing.triangles[i];
+    drawing.objects[kept++] = drawing.objects[i];
+  }
+  drawing.triangles.resize(kept);
+  drawing.objects.resize(kept);
 }
 
 std::uint64_t SelectiveRefinement::bytes() const {

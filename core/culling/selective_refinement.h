@@ -40,6 +40,12 @@ class SelectiveRefinement {
   Drawing draw(const Shot& shot, double most_px,
                std::optional<std::span<const GroupIndex>> visible_groups) const;
 
+  /// Leaves out of a drawing what lies under the outline of what is nearer in it (over_outline).
+  /// Where the eye is not over the drawing's surface, nothing is.
+  /// Side: no pixel of its picture changes, but those that show a triangle from below, through
+  /// void. Cost: O(active + n log n).
+  void leave_out_hidden(const Shot& shot, Drawing& drawing) const;
+
   const CollapseHistory& history() const { return history_; }
   std::uint64_t bytes() const;
 
@@ -74,6 +80,7 @@ class SelectiveRefinement {
   bool is_over_seen(const SeenGround& seen, TriangleIndex triangle) const;
   bool touches(const std::array<VertexIndex, 3>& triangle, std::uint32_t column,
                std::uint32_t row) const;
+  bool is_over(const Position& eye, const Drawing& drawing) const;
 
   const Tin& tin_;
   const Groups& groups_;

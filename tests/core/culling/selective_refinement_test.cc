@@ -138,5 +138,39 @@ TEST(SelectiveRefinement, PlacesAreOffByNoMoreThanAllowed) {
   EXPECT_LT(least, most);
 }
 
+TEST(SelectiveRefinement, LeavingOutWhatTheOutlineHidesChangesNoPicture) {
+  const test::GroupedGround scene = test::grouped_hills(4);
+  const SelectiveRefinement refinement(scene.tin, scene.groups);
+  std::uint64_t drawn = 0, left = 0;
+  for (const Shot& shot : shots_over(scene.tin, 20, 4)) {
+    for (const double most_px : {0.0, 1.0}) {
+      auto drawing = refinement.draw(shot, most_px, std::nullopt);
+      const Target whole = picture_of(scene.tin, drawing, shot);
+      const std::size_t active = drawing.active.size();
+      drawn += drawing.triangles.size();
+      refinement.leave_out_hidden(shot, drawing);
+      left += drawing.triangles.size();
+      EXPECT_EQ(drawing.objects.size(), drawing.triangles.size());
+      EXPECT_EQ(drawing.active.size(), active);
+      EXPECT_EQ(picture_of(scene.tin, drawing, shot).object, whole.object);
+    }
+  }
+  EXPECT_LT(left, drawn / 2);
+}
+
+TEST(SelectiveRefinement, AnEyeThatIsNotOverTheGroundLosesNothing) {
+  const test::GroupedGround scene = test::grouped_hills(5);
+  const SelectiveRefinement refinement(scene.tin, scene.groups);
+  for (const double below_m : {30.0, 5000.0}) {
+    Shot shot = shots_over(scene.tin, 1, 5).front();
+    // Under the ground, and beside it.
+    (below_m < 1000 ? shot.view.eye.z_m : shot.view.eye.x_m) -= below_m;
+    auto drawing = refinement.draw(shot, 1, std::nullopt);
+    const std::size_t all = drawing.triangles.size();
+    refinement.leave_out_hidden(shot, drawing);
+    EXPECT_EQ(drawing.triangles.size(), all);
+  }
+}
+
 }  // namespace
 }  // namespace scarp
