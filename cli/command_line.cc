@@ -462,6 +462,16 @@ void add_fly(CLI::App& app, FlyOptions& o, std::function<int()>& run) {
                 "Groups that are taken away or come back every ten frames; methods that prepared "
                 "for the scene as it was do not fly; none unless given")
       ->check(CLI::Range(0, 1'000'000));
+  c->add_option("--refine", o.refine_px,
+                "Draw the answers with levels of detail too, refined until no place is off by more "
+                "pixels, and nothing under the outline of what is nearer; not unless given")
+      ->check(CLI::Range(0.01, 1000.0))
+      ->excludes("--changes");
+  c->add_option("--budget", o.budget,
+                "Draw the answers with levels of groups too, in so many triangles a frame; not "
+                "unless given")
+      ->check(CLI::Range(1, 1'000'000'000))
+      ->excludes("--changes");
   c->add_option("--pictures", o.pictures, "Frames that are kept as pictures; 2 unless given")
       ->check(CLI::Range(0, 1000));
   add_common(*c, o.common);

@@ -12,6 +12,7 @@
 #include "cli/fly/flight_page.h"
 #include "cli/fly/flight_path.h"
 #include "cli/fly/frame_picture.h"
+#include "cli/fly/level_flight.h"
 #include "cli/loaded_scene.h"
 #include "cli/outputs.h"
 #include "cli/progress_bar.h"
@@ -200,7 +201,26 @@ bool is_pictured(std::size_t frame, std::size_t frames, int pictures) {
   return pictures > 0 && (frame == 0 || at(frame) != at(frame - 1));
 }
 
-nlohmann::json json_of(const Flight& flight, const std::vector<Contender>& contenders) {
+/// What levels made of a method's answers, means of a frame.
+void add_levels(const LevelFlight& levels, std::size_t contender, std::size_t frames,
+                nlohmann::json& method) {
+  const LevelSum& sum = levels.sums()[contender];
+  const auto mean = [&](double of_all) { return of_all / static_cast<double>(frames); };
+  if (levels.plan().refine_px > 0)
+    method["refined"] = {{"most_px", levels.plan().refine_px},
+                         {"without_culling", mean(static_cast<double>(levels.refined_whole()))},
+                         {"by_groups", mean(static_cast<double>(sum.refined))},
+                         {"drawn", mean(static_cast<double>(sum.over_outline))},
+                         {"ms", mean(sum.refine_ms)},
+                         {"other_px", sum.other_px}};
+  if (levels.plan().budget > 0)
+    method["budget"] = {{"triangles", levels.plan().budget},
+                        {"drawn", mean(static_cast<double>(sum.in_budget))},
+                        {"level_px", sum.level_px}};
+}
+
+nlohmann::json json_of(const Flight& flight, const std::vector<Contender>& contenders,
+                       const LevelFlight& levels) {
   nlohmann::json methods = nlohmann::json::array();
   for (std::size_t c = 0; c < contenders.size(); ++c) {
     const FlightSum sum = sum_of(flight, c);
@@ -218,6 +238,7 @@ nlohmann::json json_of(const Flight& flight, const std::vector<Contender>& conte
                        {"movers", sum.movers},
                        {"missed_movers", sum.missed_movers},
                        {"bytes", contenders[c].bytes}});
+    add_levels(levels, c, flight.truth.size(), methods.back());
   }
   std::uint64_t movers = 0, visible_movers = 0;
   for (const FrameTruth& truth : flight.truth) {
@@ -251,6 +272,39 @@ void print_table(const Flight& flight, const std::vector<Contender>& contenders)
       "exact ray confirms.\n");
 }
 
+void print_levels(const LevelFlight& levels, const std::vector<Contender>& contenders,
+                  std::size_t frames) {
+  const LevelPlan& plan = levels.plan();
+  const auto count = static_cast<double>(frames);
+  if (plan.refine_px > 0) {
+    const auto whole = static_cast<double>(levels.refined_whole());
+    fmt::print(
+        "\nRefined to {} px: {:.0f} triangles a frame without culling\n{:<13} {:>9} {:>9} "
+        "{:>9} {:>11} {:>12}\n",
+        plan.refine_px, whole / count, "method", "by groups", "drawn", "of whole", "refine, ms",
+        "other pixels");
+    for (std::size_t c = 0; c < contenders.size(); ++c) {
+      const LevelSum& sum = levels.sums()[c];
+      const auto drawn = static_cast<double>(sum.over_outline);
+      fmt::print("{:<13} {:>9.0f} {:>9.0f} {:>7.1f} % {:>11.2f} {:>12}\n", contenders[c].label,
+                 static_cast<double>(sum.refined) / count, drawn / count,
+                 100 * drawn / std::max(1.0, whole), sum.refine_ms / count, sum.other_px);
+    }
+  }
+  if (plan.budget == 0) return;
+  fmt::print("\nWithin {} triangles a frame: pixels by level\n{:<13} {:>9} {:>8} {:>8} {:>8}\n",
+             plan.budget, "method", "drawn", "finest", "second", "third");
+  for (std::size_t c = 0; c < contenders.size(); ++c) {
+    const LevelSum& sum = levels.sums()[c];
+    const auto all = static_cast<double>(
+        std::accumulate(sum.level_px.begin(), sum.level_px.end(), std::uint64_t{0}));
+    fmt::print("{:<13} {:>9.0f}", contenders[c].label, static_cast<double>(sum.in_budget) / count);
+    for (const std::uint64_t px : sum.level_px)
+      fmt::print(" {:>6.1f} %", 100 * static_cast<double>(px) / std::max(1.0, all));
+    fmt::print("\n");
+  }
+}
+
 }  // namespace
 
 int run_fly(const FlyOptions& options) {
@@ -260,8 +314,8 @@ int run_fly(const FlyOptions& options) {
       options.path_file.empty()
           ? find_path(scene, route_of(options.route), options.frames, options.seed)
           : read_path(options.path_file);
-  const Prepared prepared(
-      scene, is_wanted(options.methods, "lod-query") || is_wanted(options.methods, "multi-frame"));
+  const Prepared prepared(scene, options.budget > 0 || is_wanted(options.methods, "lod-query") ||
+                                     is_wanted(options.methods, "multi-frame"));
   std::vector<Contender> contenders = contenders_of(scene, prepared, options.methods);
   if (options.changes > 0) keep_those_that_follow(scene, contenders, options.methods);
 
@@ -275,6 +329,14 @@ int run_fly(const FlyOptions& options) {
   plan.movers = make_movers(scene, options.movers, options.route == "street", options.seed);
   plan.changes = options.changes;
   plan.seed = options.seed;
+
+  LevelFlight levels(scene.tin, scene.groups, prepared.batches,
+                     prepared.coarse ? &*prepared.coarse : nullptr,
+                     {options.refine_px, options.budget}, contenders.size());
+  plan.see_groups = [&](std::size_t frame, std::size_t contender,
+                        std::span<const GroupIndex> groups) {
+    levels.see(plan.shots[frame], contender, groups);
+  };
 
   std::vector<std::pair<std::string, std::string>> pictures;
   ProgressBar bar(!options.common.json);
@@ -304,10 +366,12 @@ int run_fly(const FlyOptions& options) {
                                        path.size(), lens.width_px, lens.height_px),
                            pictures));
   folder.commit();
-  if (options.common.json)
-    fmt::print("{}\n", json_of(flight, contenders).dump(2));
-  else
+  if (options.common.json) {
+    fmt::print("{}\n", json_of(flight, contenders, levels).dump(2));
+  } else {
     print_table(flight, contenders);
+    print_levels(levels, contenders, flight.truth.size());
+  }
   return 0;
 }
 

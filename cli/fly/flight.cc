@@ -170,6 +170,7 @@ class Runner {
     count_wrong(0, shot, whole, pictures, counts);
     for (std::size_t s = 1; s < kPictureScales.size(); ++s)
       count_wrong(s, shot, whole, painter_.draw(shot, kPictureScales[s], has_translucent_), counts);
+    if (plan_.see_groups) plan_.see_groups(frame, contender, groups);
     picture = std::move(pictures.opaque);
     return counts;
   }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -66,6 +67,9 @@ struct FlightPlan {
   /// Groups that are taken away, or come back, every kChangeFrames; 0: the scene stays as it is.
   std::uint32_t changes = 0;
   std::uint64_t seed = 1;  ///< of the changes
+  /// Called with each answer: the groups in the picture.
+  std::function<void(std::size_t frame, std::size_t contender, std::span<const GroupIndex> groups)>
+      see_groups = {};
 };
 inline constexpr std::size_t kChangeFrames = 10;
 

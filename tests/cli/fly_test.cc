@@ -74,6 +74,42 @@ TEST_F(FlyCommand, MethodsThatClaimItShowNoWrongPixelAndLeaveSomethingOut) {
   }
 }
 
+TEST_F(FlyCommand, AnswersAreDrawnRefinedAndWithinABudget) {
+  const std::string fly = "$SCARP fly " + scene_ + " --overwrite -o " + folder_->path("levels") +
+                          " --route walk --frames 8 --width 160 --json --refine 1 "
+                          "--methods frustum,certified --budget ";
+  const auto methods_within = [&](int budget) {
+    const RunResult run = run_scarp(fly + std::to_string(budget));
+    EXPECT_EQ(run.exit_code, 0) << run.errors;
+    return json::parse(run.output)["methods"];
+  };
+  const auto finest = [](const json& method) {
+    const json& px = method["budget"]["level_px"];
+    return px[0].get<double>() / (px[0].get<double>() + px[1].get<double>() + px[2].get<double>());
+  };
+  const json free = methods_within(1'000'000);
+  for (const json& method : free) {
+    EXPECT_EQ(finest(method), 1);
+    EXPECT_EQ(method["refined"]["other_px"], 0);
+    EXPECT_LT(method["refined"]["drawn"], method["refined"]["without_culling"].get<double>() / 2);
+  }
+  const json &everything = free[0]["refined"], &certified = free[1]["refined"];
+  EXPECT_EQ(everything["by_groups"], everything["without_culling"]);
+  EXPECT_LT(certified["by_groups"], everything["by_groups"]);
+  EXPECT_LE(certified["drawn"], certified["by_groups"]);
+
+  const int budget = static_cast<int>(free[1]["budget"]["drawn"].get<double>());
+  const json tight = methods_within(budget);
+  for (const json& method : tight) EXPECT_LE(method["budget"]["drawn"], budget);
+  EXPECT_LT(finest(tight[0]), 1);
+  EXPECT_GT(finest(tight[1]), finest(tight[0]))
+      << "what is culled leaves triangles to what is seen";
+
+  const RunResult refused = run_scarp("$SCARP fly " + scene_ + " -o " + folder_->path("refused") +
+                                      " --refine 1 --changes 4");
+  EXPECT_EQ(refused.exit_code, 2);
+}
+
 TEST_F(FlyCommand, MoversAreLeftOutOnlyWhereTheyAreHidden) {
   const RunResult run =
       run_scarp("$SCARP fly " + scene_ + " -o " + folder_->path("movers") +
