@@ -9,6 +9,7 @@
 #include "cli/commands.h"
 #include "cli/compare/compared_ground.h"
 #include "cli/compare/compared_page.h"
+#include "cli/compare/grass_peers.h"
 #include "cli/compare/groups_job.h"
 #include "cli/compare/jobs.h"
 #include "cli/loaded_scene.h"
@@ -72,12 +73,14 @@ class Comparing {
         "Speed against accuracy: " + fs::path(options_.sources.front()).filename().string();
     run_.facts = machine_facts();
     run_.facts["command"] =
-        fmt::format("scarp compare {} -o DIR --time {:g}s --seed {}",
-                    fmt::join(options_.sources, " "), options_.limit_s, options_.seed);
+        fmt::format("scarp compare '{}' -o DIR --time {:g}s --seed {} --eyes {} --heights {:g}",
+                    fmt::join(options_.sources, "' '"), options_.limit_s, options_.seed,
+                    options_.eyes, fmt::join(options_.heights_m, ","));
     if (const std::string* scene = scene_among(options_.sources, options_.dem))
       compare_scene(*scene);
     else
       compare_dem();
+    name_commands(run_);
     bar_.clear();
     return std::move(run_);
   }
@@ -113,27 +116,45 @@ class Comparing {
                              kEyesOfViewsheds, options_.seed);
     for (const std::string& file : options_.sources)
       run_.facts["input " + fs::path(file).filename().string()] = fact_of_file(file);
+    run_.facts["command"] += ground.surface_flags;
+    if (!ground.cut_command.empty()) run_.facts["square.tif"] = ground.cut_command;
+    std::string why;
+    const std::unique_ptr<GrassPeers> grass = GrassPeers::find(ground, why);
+    std::vector<ViewshedPeer> viewsheds;
+    std::vector<HorizonPeer> horizons;
+    if (grass) {
+      viewsheds.push_back(grass->viewshed());
+      horizons.push_back(grass->horizon());
+    }
     const auto compare = [&](const char* name, const auto& job) {
       if (watch_.seconds() < options_.limit_s)
         run_.jobs.push_back(job(bar_.stage(name)));
       else
         run_.facts["left out: " + std::string(name)] = "for lack of time";
     };
-    compare("viewsheds", [&](const Progress& p) { return compare_viewsheds(ground, p); });
+    compare("viewsheds",
+            [&](const Progress& p) { return compare_viewsheds(ground, p, viewsheds); });
     compare("heights", [&](const Progress& p) { return compare_heights(ground, p); });
-    compare("horizons",
-            [&](const Progress& p) { return compare_horizons(ground, options_.seed, p); });
+    compare("horizons", [&](const Progress& p) {
+      return compare_horizons(ground, options_.seed, p, horizons);
+    });
     compare("meshes", [&](const Progress& p) { return compare_meshes(ground, p); });
     compare("groups", [&](const Progress&) {
       const Mesh mesh = mesh_samples(ground.samples, {.vertex_budget = kMostVertices}, {});
       const TinIndex index(mesh.tin);
       HiddenTogetherOptions growth;
       growth.seed = options_.seed;
-      return compare_groups({mesh.tin, index, *ground.dem.frame, growth,
-                             fmt::format("scarp build {} -o S --vertices {}",
-                                         fmt::join(options_.sources, " "), kMostVertices)},
-                            question(), stages());
+      return compare_groups(
+          {mesh.tin, index, *ground.dem.frame, growth,
+           fmt::format("scarp build '{}' -o S --vertices {}{}", fmt::join(ground.files, "' '"),
+                       kMostVertices, ground.surface_flags)},
+          question(), stages());
     });
+    if (!grass)
+      for (ComparedJob& job : run_.jobs)
+        for (const auto& [name, program] :
+             {std::pair("viewshed", "r.viewshed"), std::pair("horizon", "r.horizon")})
+          if (job.name == name) job.left_out.push_back(fmt::format("{}: {}", program, why));
   }
 
   const CompareOptions& options_;
@@ -169,9 +190,9 @@ int run_compare(const CompareOptions& options) {
     if (!(std::abs(height_m) <= 1e7))
       throw Error(ErrorCode::kUsage,
                   fmt::format("--heights {}: metres above ground were expected", height_m));
-  check_new_file(options.output, options.common);
+  PartFolder folder(options.output, kComparisonName, existing(options.common));
   const ComparedRun run = Comparing(options).run();
-  write_comparison(run, options.output, existing(options.common));
+  write_comparison(run, folder);
   if (options.common.json) {
     fmt::print("{}\n", to_json(run).dump(2));
     return 0;

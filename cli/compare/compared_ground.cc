@@ -22,6 +22,18 @@ std::string flags_of(const DemOptions& options) {
   return flags;
 }
 
+constexpr char kSquareName[] = "square.tif";
+
+std::string cut_command_of(const std::vector<std::string>& files, const SampleRect& rect) {
+  std::string gather, from = "'" + files.front() + "'";
+  if (files.size() > 1) {
+    gather = fmt::format("gdalbuildvrt all.vrt '{}' && ", fmt::join(files, "' '"));
+    from = "all.vrt";
+  }
+  return fmt::format("{}gdal_translate -srcwin {} {} {} {} {} {}", gather, rect.first_column,
+                     rect.first_row, rect.columns, rect.rows, from, kSquareName);
+}
+
 ComparedGround::Eye highest_of(const ComparedGround& ground) {
   ComparedGround::Eye best;
   double most_m = -HUGE_VAL;
@@ -75,6 +87,10 @@ ComparedGround read_compared_ground(const std::vector<std::string>& files,
                 fmt::format("'{}': its middle, {} x {} samples, is void; known ground was "
                             "expected; cut it with gdal_translate -srcwin",
                             files.front(), rect.columns, rect.rows));
+  if (rect.columns < dem.columns || rect.rows < dem.rows) {
+    ground.cut_command = cut_command_of(files, rect);
+    ground.files = {kSquareName};
+  }
   ground.samples = place_window(dem, window);
   dem.geotransform[0] += rect.first_column * dem.geotransform[1];
   dem.geotransform[3] += rect.first_row * dem.geotransform[5];

@@ -14,8 +14,10 @@ namespace scarp {
 
 /// The square of a DEM that methods are compared on: small enough to be judged sample by sample.
 struct ComparedGround {
-  std::vector<std::string> files;
-  Dem dem;  ///< of the square, with heights
+  std::vector<std::string>
+      files;                ///< that commands get: the ones read, or the square cut from them
+  std::string cut_command;  ///< that cuts the square; empty where it is all of the DEM
+  Dem dem;                  ///< of the square, with heights
   SampleGrid samples;
   GroundGrid grid;
   std::optional<EarthFrame> earth;

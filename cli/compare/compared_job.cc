@@ -7,16 +7,20 @@
 
 namespace scarp {
 
+Timed median_of(std::vector<double> seconds) {
+  assert(!seconds.empty());
+  std::sort(seconds.begin(), seconds.end());
+  return {seconds[seconds.size() / 2], seconds.front(), seconds.back()};
+}
+
 Timed timed(int runs, const std::function<void()>& run) {
-  assert(runs > 0);
   std::vector<double> seconds;
   for (int i = 0; i < runs; ++i) {
     const Stopwatch watch;
     run();
     seconds.push_back(watch.seconds());
   }
-  std::sort(seconds.begin(), seconds.end());
-  return {seconds[seconds.size() / 2], seconds.front(), seconds.back()};
+  return median_of(std::move(seconds));
 }
 
 void add_time(ComparedPoint& point, const Timed& time) {

@@ -12,6 +12,7 @@ namespace scarp {
 struct ComparedPoint {
   std::string method;   ///< points of one method share a colour
   std::string setting;  ///< short, unique within the method
+  /// A spread of FIGURE, where there is one, is FIGURE_least and FIGURE_most.
   std::map<std::string, double> figures;
   bool is_default = false;
   bool is_judge = false;   ///< what the others' errors are measured against
@@ -19,13 +20,14 @@ struct ComparedPoint {
   std::string command;     ///< that gives this point's answer; empty where none does
 };
 
-/// A chart of a job's points. Both axes are logarithmic; less is better on both.
+/// A chart of a job's points. Less is better on both axes; x is logarithmic.
 struct ComparedChart {
   std::string x, x_words;  ///< name of a figure, and what it is with its unit
   std::string y, y_words;
   /// The method whose points are joined by a line, because they differ in what the chart is about;
   /// may be empty. Otherwise the points that no other beats on both axes are joined.
   std::string joined;
+  bool is_y_linear = false;  ///< from zero, or else logarithmic
 };
 
 /// What several methods make of one task, measured in one run.
@@ -42,6 +44,10 @@ struct ComparedJob {
 struct Timed {
   double median_s = 0, least_s = 0, most_s = 0;
 };
+/// How often each thing is timed, where there is time for it.
+inline constexpr int kComparedRuns = 3;
+/// Of the seconds of some runs, at least one.
+Timed median_of(std::vector<double> seconds);
 /// Runs it so many times.
 Timed timed(int runs, const std::function<void()>& run);
 /// Adds seconds, seconds_least and seconds_most.

@@ -13,7 +13,6 @@
 #include "cli/compare/job_chart.h"
 #include "cli/svg.h"
 #include "core/threads/parallel_for.h"
-#include "tiles/store/part_folder.h"
 
 namespace scarp {
 namespace {
@@ -140,6 +139,12 @@ std::map<std::string, std::string> machine_facts() {
   return facts;
 }
 
+void name_commands(ComparedRun& run) {
+  for (ComparedJob& job : run.jobs)
+    for (ComparedPoint& p : job.points)
+      if (p.command.empty()) p.command = run.facts.at("command");
+}
+
 json to_json(const ComparedRun& run) {
   json result = {{"title", run.title}, {"facts", run.facts}, {"jobs", json::array()}};
   for (const ComparedJob& job : run.jobs) {
@@ -171,15 +176,14 @@ json to_json(const ComparedRun& run) {
   return result;
 }
 
-void write_comparison(const ComparedRun& run, const std::string& folder, Existing existing) {
-  PartFolder part(folder, "compare.json", existing);
+void write_comparison(const ComparedRun& run, PartFolder& folder) {
   for (const ComparedJob& job : run.jobs)
     for (const ComparedChart& chart : job.charts)
-      if (has_point(job, chart)) part.write(picture_name(job, chart), draw_chart(job, chart));
-  part.write("compare.html", page_of(run));
-  part.write("compare.csv", csv_of(run));
-  part.write("compare.json", to_json(run).dump(2) + "\n");
-  part.commit();
+      if (has_point(job, chart)) folder.write(picture_name(job, chart), draw_chart(job, chart));
+  folder.write("compare.html", page_of(run));
+  folder.write("compare.csv", csv_of(run));
+  folder.write(kComparisonName, to_json(run).dump(2) + "\n");
+  folder.commit();
 }
 
 }  // namespace scarp

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cli/compare/compared_job.h"
-#include "tiles/store/part_file.h"
+#include "tiles/store/part_folder.h"
 
 namespace scarp {
 
@@ -20,10 +20,17 @@ struct ComparedRun {
 /// Machine, processors, compiler and versions.
 std::map<std::string, std::string> machine_facts();
 
+/// Points that no command of their own gives get the run's, which is the fact "command".
+void name_commands(ComparedRun& run);
+
+/// What the folder of a comparison holds, that another may replace.
+inline constexpr char kComparisonName[] = "compare.json";
+
 nlohmann::json to_json(const ComparedRun& run);
 
 /// Writes compare.html, which needs no other file and no network, compare.json, compare.csv (a line
-/// a point and figure), and a picture for each chart, JOB-ERROR-by-COST.svg. Throws Error.
-void write_comparison(const ComparedRun& run, const std::string& folder, Existing existing);
+/// a point and figure), and a picture for each chart, JOB-ERROR-by-COST.svg, and commits the
+/// folder. Throws Error.
+void write_comparison(const ComparedRun& run, PartFolder& folder);
 
 }  // namespace scarp

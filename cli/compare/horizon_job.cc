@@ -5,6 +5,7 @@
 
 #include "cli/accuracy.h"
 #include "cli/compare/jobs.h"
+#include "core/error/error.h"
 #include "core/horizon/stewart.h"
 #include "core/skyline/crossing_kernels.h"
 #include "core/skyline/skyline.h"
@@ -62,13 +63,20 @@ class HorizonComparison {
     job_.name = "horizon";
     job_.title = "The horizon of every point, and how far it is off";
     job_.notes = {
-        fmt::format("{} x {} samples in {} directions, judged at {} samples; thesis: {} vertices, "
-                    "judged in the middle of sectors.",
-                    ground_.dem.columns, ground_.dem.rows, kComparedAzimuths, kJudgedPlaces,
-                    kStewartVertices),
-        fmt::format("Median of {} runs on {} threads.", kComparedRuns, thread_count())};
-    job_.charts = {{"ns_a_point_and_direction", "nanoseconds a point and direction",
-                    "mean_error_deg", "mean error, degrees", ""}};
+        fmt::format("{} x {} samples in {} directions, judged at {} samples. Ours: a sweep along "
+                    "lines, by tolerance; thesis: by",
+                    ground_.dem.columns, ground_.dem.rows, kComparedAzimuths, kJudgedPlaces),
+        fmt::format(
+            "sectors/subsectors, {} vertices, judged in the middle of sectors. Median of {} "
+            "runs on {} thread{}, lines from",
+            kStewartVertices, kComparedRuns, thread_count(), thread_count() == 1 ? "" : "s"),
+        "the least to the most; r.horizon on one thread."};
+    constexpr char kTime[] = "ns_a_point_and_direction";
+    constexpr char kTimeWords[] = "nanoseconds a point and direction";
+    job_.charts = {{kTime, kTimeWords, "mean_error_deg", "mean error, degrees", ""},
+                   {kTime, kTimeWords, "largest_error_deg", "largest error, degrees", ""},
+                   {kTime, kTimeWords, "mean_width_of_bounds_deg",
+                    "mean width between the bounds, degrees", ""}};
     judge();
     if (progress_) progress_(0.2);
     for (const double tolerance_deg : {0.03, 0.1, 0.3, 1.0, 3.0}) look(tolerance_deg, true);
@@ -156,18 +164,27 @@ class HorizonComparison {
 
   void add_cost(ComparedPoint& point, const Timed& time, double looks) const {
     add_time(point, time);
-    point.figures["ns_a_point_and_direction"] = 1e9 * time.median_s / looks;
+    const std::string name = "ns_a_point_and_direction";
+    point.figures[name] = 1e9 * time.median_s / looks;
+    point.figures[name + "_least"] = 1e9 * time.least_s / looks;
+    point.figures[name + "_most"] = 1e9 * time.most_s / looks;
   }
 
   void look_with(const HorizonPeer& peer) {
     std::vector<double> elevation_deg(truth_.size());
-    const double seconds = peer.look(places_, elevation_deg);
+    std::vector<double> seconds;
+    try {
+      seconds = peer.look(places_, elevation_deg);
+    } catch (const Error& failure) {
+      job_.left_out.push_back(peer.method + ": " + failure.what());
+      return;
+    }
     DegreesOff off;
     for (std::size_t i = 0; i < truth_.size(); ++i)
       if (truth_[i].is_usable && !std::isnan(elevation_deg[i]))
         off.add(truth_[i].elevation_deg, elevation_deg[i]);
     ComparedPoint point{peer.method, peer.setting, {}, false, false, false, peer.command};
-    add_cost(point, {seconds, seconds, seconds},
+    add_cost(point, median_of(std::move(seconds)),
              peer.looks > 0 ? peer.looks : static_cast<double>(truth_.size()));
     off.put(point);
     job_.points.push_back(std::move(point));

@@ -6,13 +6,14 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <optional>
 
 #include "cli/svg.h"
 
 namespace scarp {
 namespace {
 
-constexpr double kWidthPx = 900, kHeightPx = 620, kLeftPx = 96, kRightPx = 872;
+constexpr double kWidthPx = 900, kLegendPx = 590, kLeftPx = 96, kRightPx = 872;
 constexpr double kBottomPx = 520, kZeroPx = 500;  // zero lies this low, under the decades
 constexpr double kMarkPx = 5, kLabelPx = 12, kLinePx = 20;
 constexpr std::array<const char*, 8> kColours = {"#2566b0", "#c46a1b", "#1f8a4c", "#9457b8",
@@ -27,26 +28,62 @@ struct Box {
   }
 };
 
-/// An axis by powers of ten.
-struct Decades {
-  double low = HUGE_VAL, high = -HUGE_VAL;  // log10
+/// A mark of an axis: 200, 0.01, 5·10⁷.
+std::string number(double value) {
+  constexpr std::array<const char*, 10> kRaised = {"\u2070", "\u00b9", "\u00b2", "\u00b3",
+                                                   "\u2074", "\u2075", "\u2076", "\u2077",
+                                                   "\u2078", "\u2079"};
+  const int power = static_cast<int>(std::floor(std::log10(value) + 1e-9));
+  if (value == 0 || (power >= -3 && power <= 4)) return fmt::format("{:g}", value);
+  std::string words;
+  const double factor = std::round(value / std::pow(10, power));
+  if (factor != 1) words = fmt::format("{:g}\u00b7", factor);
+  words += "10";
+  if (power < 0) words += "\u207b";
+  for (const char digit : std::to_string(std::abs(power)))
+    words += kRaised[static_cast<std::size_t>(digit - '0')];
+  return words;
+}
 
+/// An axis by powers of ten, or in even steps from zero.
+struct Axis {
+  bool is_linear = false;
+  double low = HUGE_VAL, high = -HUGE_VAL;  // log10 of values, or values
+
+  bool is_empty() const { return low > high; }
   void take(double value) {
-    low = std::min(low, std::log10(value));
-    high = std::max(high, std::log10(value));
+    const double at = is_linear ? value : std::log10(value);
+    low = std::min(low, at);
+    high = std::max(high, at);
   }
   /// Leaves room around what was taken.
   void widen() {
-    if (low > high) low = high = 0;
-    const double middle = (low + high) / 2, half = 0.62 * std::max(high - low, 1.0);
+    if (is_empty()) return;
+    if (is_linear) {
+      low = 0, high = high > 0 ? 1.08 * high : 1;
+      return;
+    }
+    const double middle = (low + high) / 2, half = 0.6 * std::max(high - low, 0.6);
     low = middle - half, high = middle + half;
   }
-  double place(double value) const { return (std::log10(value) - low) / (high - low); }
+  double place(double value) const {
+    return ((is_linear ? value : std::log10(value)) - low) / (high - low);
+  }
   std::vector<double> marks() const {
-    const bool is_fine = high - low < 3;
     std::vector<double> result;
+    if (is_empty()) return result;
+    if (is_linear) {
+      const double step = round_step(high, 8);
+      for (int i = 0; i * step <= high; ++i) result.push_back(i * step);
+      return result;
+    }
+    static const std::vector<double> kFine = {1, 1.5, 2, 3, 4, 5, 7}, kUsual = {1, 2, 5},
+                                     kCoarse = {1};
+    const std::vector<double>& factors = high - low < 1.3 ? kFine
+                                         : high - low < 3 ? kUsual
+                                                          : kCoarse;
     for (int power = static_cast<int>(std::floor(low)); power <= high; ++power)
-      for (const double factor : is_fine ? std::vector{1.0, 2.0, 5.0} : std::vector{1.0}) {
+      for (const double factor : factors) {
         const double value = factor * std::pow(10, power);
         if (std::log10(value) >= low && std::log10(value) <= high) result.push_back(value);
       }
@@ -54,15 +91,31 @@ struct Decades {
   }
 };
 
+/// The marks of methods: as many colours, then as many in another shape.
+std::string shape(std::size_t method, double x, double y, double radius, const char* fill,
+                  const char* stroke) {
+  if (method < kColours.size())
+    return fmt::format(
+        "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\" fill=\"{}\" stroke=\"{}\" "
+        "stroke-width=\"2\"/>\n",
+        x, y, radius, fill, stroke);
+  return fmt::format(
+      "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{}\" height=\"{}\" fill=\"{}\" stroke=\"{}\" "
+      "stroke-width=\"2\"/>\n",
+      x - radius, y - radius, 2 * radius, 2 * radius, fill, stroke);
+}
+
 class Drawing {
  public:
   Drawing(const ComparedJob& job, const ComparedChart& chart) : job_(job), chart_(chart) {
+    y_.is_linear = chart.is_y_linear;
     for (const ComparedPoint& p : job.points) {
       if (std::find(methods_.begin(), methods_.end(), p.method) == methods_.end())
         methods_.push_back(p.method);
       if (!is_drawn(p)) continue;
       x_.take(x_of(p));
-      if (y_of(p) > 0)
+      if (const auto spread = spread_of(p)) x_.take(spread->first), x_.take(spread->second);
+      if (y_of(p) > 0 || y_.is_linear)
         y_.take(y_of(p));
       else
         has_zero_ = true;
@@ -73,7 +126,6 @@ class Drawing {
   }
 
   std::string draw() {
-    svg_ = svg_begin(kWidthPx, kHeightPx);
     svg_ += svg_text(40, 36, "start", kInkColour, 20, job_.title);
     double y_px = 60;
     for (const std::string& note : job_.notes) {
@@ -86,8 +138,8 @@ class Drawing {
       if (is_drawn(p)) mark(p);
     for (const ComparedPoint& p : job_.points)
       if (is_drawn(p)) label(p);
-    legend();
-    return svg_ + "</svg>\n";
+    const double height_px = legend();
+    return svg_begin(kWidthPx, height_px) + svg_ + "</svg>\n";
   }
 
  private:
@@ -99,27 +151,37 @@ class Drawing {
   double x_of(const ComparedPoint& p) const { return p.figures.at(chart_.x); }
   double y_of(const ComparedPoint& p) const { return p.figures.at(chart_.y); }
   double x_px(double x) const { return kLeftPx + (kRightPx - kLeftPx) * x_.place(x); }
+  /// Least and most of the runs, where they are known.
+  std::optional<std::pair<double, double>> spread_of(const ComparedPoint& p) const {
+    const auto least = p.figures.find(chart_.x + "_least");
+    const auto most = p.figures.find(chart_.x + "_most");
+    if (least == p.figures.end() || most == p.figures.end() || !(least->second > 0)) return {};
+    return std::pair(least->second, most->second);
+  }
   double floor_px() const { return has_zero_ ? kZeroPx - 30 : kBottomPx; }
   double y_px(double y) const {
-    return y <= 0 ? kZeroPx : floor_px() - (floor_px() - top_px_) * y_.place(y);
+    return has_zero_ && y <= 0 ? kZeroPx : floor_px() - (floor_px() - top_px_) * y_.place(y);
+  }
+  std::size_t number_of(const std::string& method) const {
+    return static_cast<std::size_t>(std::find(methods_.begin(), methods_.end(), method) -
+                                    methods_.begin());
   }
   const char* colour_of(const std::string& method) const {
-    const auto at = std::find(methods_.begin(), methods_.end(), method) - methods_.begin();
-    return kColours[static_cast<std::size_t>(at) % kColours.size()];
+    return kColours[number_of(method) % kColours.size()];
   }
 
   void axes() {
     for (const double x : x_.marks()) {
       svg_ += fmt::format("<path d=\"M{0:.1f} {1}V{2}\" stroke=\"{3}\"/>\n", x_px(x), top_px_,
                           kBottomPx, kFaintColour);
-      svg_ += svg_text(x_px(x), kBottomPx + 20, "middle", kInkColour, 13, fmt::format("{:g}", x));
+      svg_ += svg_text(x_px(x), kBottomPx + 20, "middle", kInkColour, 13, number(x));
     }
     const auto across = [&](double at_px, const std::string& words) {
       svg_ += fmt::format("<path d=\"M{} {:.1f}H{}\" stroke=\"{}\"/>\n", kLeftPx, at_px, kRightPx,
                           kFaintColour);
       svg_ += svg_text(kLeftPx - 8, at_px + 4.5, "end", kInkColour, 13, words);
     };
-    for (const double y : y_.marks()) across(y_px(y), fmt::format("{:g}", y));
+    for (const double y : y_.marks()) across(y_px(y), number(y));
     if (has_zero_) across(kZeroPx, "0");
     svg_ += fmt::format("<path d=\"M{0} {1}V{2}H{3}\" fill=\"none\" stroke=\"{4}\"/>\n", kLeftPx,
                         top_px_, kBottomPx, kRightPx, kInkColour);
@@ -158,14 +220,16 @@ class Drawing {
   void mark(const ComparedPoint& p) {
     const double x = x_px(x_of(p)), y = y_px(y_of(p));
     const char* colour = colour_of(p.method);
+    if (const auto spread = spread_of(p))
+      svg_ += fmt::format(
+          "<path d=\"M{:.1f} {:.1f}H{:.1f}\" stroke=\"{}\" stroke-width=\"2\" "
+          "stroke-opacity=\"0.5\"/>\n",
+          x_px(spread->first), y, x_px(spread->second), colour);
     if (p.is_judge)
       svg_ += fmt::format("<path d=\"M{:.1f} {:.1f}l7 7l-7 7l-7-7z\" fill=\"{}\"/>\n", x, y - 7,
                           colour);
     else
-      svg_ += fmt::format(
-          "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\" fill=\"{}\" stroke=\"{}\" "
-          "stroke-width=\"2\"/>\n",
-          x, y, kMarkPx, p.is_unsafe ? "#ffffff" : colour, colour);
+      svg_ += shape(number_of(p.method), x, y, kMarkPx, p.is_unsafe ? "#ffffff" : colour, colour);
     if (p.is_default)
       svg_ += fmt::format(
           "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\" fill=\"none\" stroke=\"{}\" "
@@ -200,8 +264,9 @@ class Drawing {
     }
   }
 
-  void legend() {
-    double x = kLeftPx - 40, y = kHeightPx - 30;
+  /// @return how high the picture is with it
+  double legend() {
+    double x = kLeftPx - 40, y = kLegendPx;
     const auto entry = [&](const std::string& mark, const std::string& words) {
       const double width = 34 + 7.6 * static_cast<double>(words.size());
       if (x + width > kWidthPx - 10) x = kLeftPx - 40, y += 20;
@@ -209,30 +274,31 @@ class Drawing {
       svg_ += svg_text(x + 15, y, "start", kInkColour, 13, words);
       x += width;
     };
-    const auto circle = [](double radius, const char* fill, const char* stroke) {
-      return fmt::format("<circle r=\"{}\" fill=\"{}\" stroke=\"{}\" stroke-width=\"2\"/>", radius,
-                         fill, stroke);
-    };
     const auto any = [&](auto&& is) {
       return std::any_of(job_.points.begin(), job_.points.end(),
                          [&](const ComparedPoint& p) { return is_drawn(p) && is(p); });
     };
+    // Where settings are named like their methods, the marks' own labels say all.
+    const bool are_named =
+        any([](const ComparedPoint& p) { return !p.is_judge && p.setting != p.method; });
     for (const std::string& method : methods_)
-      if (any([&](const ComparedPoint& p) { return p.method == method; }))
-        entry(circle(kMarkPx, colour_of(method), colour_of(method)), method);
+      if (are_named && any([&](const ComparedPoint& p) { return p.method == method; }))
+        entry(shape(number_of(method), 0, 0, kMarkPx, colour_of(method), colour_of(method)),
+              method);
     if (any([](const ComparedPoint& p) { return p.is_unsafe; }))
-      entry(circle(kMarkPx, "#ffffff", kSoftColour), "culls some that are visible");
+      entry(shape(0, 0, 0, kMarkPx, "#ffffff", kSoftColour), "culls some that are visible");
     if (any([](const ComparedPoint& p) { return p.is_default; }))
-      entry(circle(2 * kMarkPx, "none", kInkColour), "default");
+      entry(shape(0, 0, 0, 2 * kMarkPx, "none", kInkColour), "default");
     if (any([](const ComparedPoint& p) { return p.is_judge; }))
       entry(fmt::format("<path d=\"M0-7l7 7l-7 7l-7-7z\" fill=\"{}\"/>", kSoftColour),
             "judge: by it errors are measured");
+    return y + 30;
   }
 
   const ComparedJob& job_;
   const ComparedChart& chart_;
   std::vector<std::string> methods_;
-  Decades x_, y_;
+  Axis x_, y_;
   bool has_zero_ = false;
   double top_px_ = 0;
   std::vector<Box> taken_;

@@ -12,15 +12,12 @@
 
 namespace scarp {
 
-/// How often each thing is timed.
-inline constexpr int kComparedRuns = 3;
-
 /// Another program's viewshed, for benchmarks that have it.
 struct ViewshedPeer {
   std::string method, setting, command;
   /// Sees from an eye kComparedEyeHeightM over a sample. @param seen[out]  [rows * columns]
-  /// @return seconds, without its start and its files
-  std::function<double(const ComparedGround::Eye&, std::span<Seen> seen)> look;
+  /// @return seconds of each of kComparedRuns, without its start and its files. Throws Error.
+  std::function<std::vector<double>(const ComparedGround::Eye&, std::span<Seen> seen)> look;
 };
 inline constexpr double kComparedEyeHeightM = 2;
 
@@ -29,9 +26,9 @@ struct HorizonPeer {
   std::string method, setting, command;
   double looks = 0;  ///< points and directions that its time is for; 0: those it is asked for
   /// @param elevation_deg[out]  [places * kComparedAzimuths], NaN where it has none
-  /// @return seconds
-  std::function<double(std::span<const ComparedGround::Eye> places,
-                       std::span<double> elevation_deg)>
+  /// @return seconds of each of kComparedRuns. Throws Error.
+  std::function<std::vector<double>(std::span<const ComparedGround::Eye> places,
+                                    std::span<double> elevation_deg)>
       look;
 };
 /// From north clockwise.

@@ -4,6 +4,7 @@
 #include <gdal_priv.h>
 
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <numeric>
 #include <optional>
@@ -173,11 +174,15 @@ class EyeComparison {
   /// @param look   (ground, eye, found[out])
   template <typename Look>
   void points_of_ours(const std::string& flags, const Look& look) {
+    const int threads = thread_count();
     for (const Accuracy accuracy : {Accuracy::kExact, Accuracy::kHigh, Accuracy::kFast}) {
       const AccuracyGround at(ground_.grid, accuracy);
       const bool is_exact = accuracy == Accuracy::kExact;
       const std::string chosen =
           is_exact ? std::string() : std::string(" --accuracy ") + name_of(accuracy);
+      const auto look_from = [&](std::size_t i, std::span<Value> found) {
+        look(at.ground, eye_over(ground_.grid, ground_.eyes[i]), found);
+      };
       point({"scarp",
              name_of(accuracy),
              {},
@@ -185,9 +190,18 @@ class EyeComparison {
              false,
              false,
              command_of(ground_, flags + chosen)},
-            [&](std::size_t i, std::span<Value> found) {
-              look(at.ground, eye_over(ground_.grid, ground_.eyes[i]), found);
-            });
+            look_from);
+      if (threads == 1) continue;
+      set_thread_count(1);
+      point({"scarp, one thread",
+             name_of(accuracy),
+             {},
+             false,
+             false,
+             false,
+             command_of(ground_, flags + chosen + " --threads 1")},
+            look_from);
+      set_thread_count(threads);
     }
   }
 
@@ -227,9 +241,15 @@ class ViewshedComparison : private EyeComparison<Seen, Wrong> {
         fmt::format("{} x {} samples, {} eyes 2 m over ground, the first over the highest sample; "
                     "seconds an eye, reading and writing not counted,",
                     ground_.dem.columns, ground_.dem.rows, ground_.eyes.size()),
-        fmt::format("median of {} runs. Ours on {} threads, gdal_viewshed's algorithm on one.",
-                    kComparedRuns, thread_count())};
-    job_.charts = {{"seconds", "seconds an eye", "wrong_percent", "samples wrong, %", ""}};
+        fmt::format(
+            "median of {} runs, lines from the least to the most. Ours on {} thread{}, other "
+            "programs on one.",
+            kComparedRuns, thread_count(), thread_count() == 1 ? "" : "s")};
+    job_.charts = {{"seconds", "seconds an eye", "wrong_percent", "samples wrong, %", ""},
+                   {"seconds", "seconds an eye", "falsely_visible_percent",
+                    "hidden samples called visible, % of all", ""},
+                   {"seconds", "seconds an eye", "falsely_hidden_percent",
+                    "visible samples called hidden, % of all", ""}};
     judge([&](std::size_t i, std::span<Seen> truth) {
       exhaustive_viewshed(ground_.grid, eye_over(ground_.grid, ground_.eyes[i]).position, 0, truth);
     });
@@ -246,16 +266,21 @@ class ViewshedComparison : private EyeComparison<Seen, Wrong> {
   }
 
  private:
-  /// Once, because peers may take minutes.
   void look_with(const ViewshedPeer& peer) {
     Wrong wrong;
-    double seconds = 0;
-    for (std::size_t i = 0; i < ground_.eyes.size(); ++i) {
-      seconds += peer.look(ground_.eyes[i], found_);
-      wrong.add(truth_[i], found_);
+    std::vector<double> seconds(kComparedRuns);  // of all eyes together
+    try {
+      for (std::size_t i = 0; i < ground_.eyes.size(); ++i) {
+        const std::vector<double> took = peer.look(ground_.eyes[i], found_);
+        std::transform(took.begin(), took.end(), seconds.begin(), seconds.begin(), std::plus());
+        wrong.add(truth_[i], found_);
+      }
+    } catch (const Error& failure) {
+      job_.left_out.push_back(peer.method + ": " + failure.what());
+      return;
     }
     finish({peer.method, peer.setting, {}, false, false, false, peer.command},
-           {seconds, seconds, seconds}, wrong);
+           median_of(std::move(seconds)), wrong);
   }
 
   void look_over_meshes() {
@@ -352,8 +377,8 @@ class HeightComparison : private EyeComparison<float, HeightsOff> {
     job_.name = "heights";
     job_.title = "From which height on a target is seen, and how far off that is";
     job_.notes = {
-        fmt::format("{} x {} samples, {} eyes 2 m over ground; seconds an eye, median of "
-                    "{} runs.",
+        fmt::format("{} x {} samples, {} eyes 2 m over ground; seconds an eye, median of {} runs, "
+                    "lines from the least to the most.",
                     ground_.dem.columns, ground_.dem.rows, ground_.eyes.size(), kComparedRuns)};
     job_.charts = {
         {"seconds", "seconds an eye", "mean_error_m", "mean error of the least height, m", ""}};

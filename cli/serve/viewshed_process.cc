@@ -10,7 +10,7 @@
 #include "cli/serve/process.h"
 #include "cli/serve/request_target.h"
 #include "cli/serve/seen_views.h"
-#include "cli/serve/temp_file.h"
+#include "cli/temp_file.h"
 #include "core/error/error.h"
 #include "tiles/layers/geopackage.h"
 

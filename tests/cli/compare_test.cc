@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <iomanip>
 #include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -11,6 +12,7 @@
 #include <sstream>
 
 #include "cli/compare/compared_job.h"
+#include "cli/compare/compared_page.h"
 #include "cli/compare/job_chart.h"
 #include "tests/support/run_scarp.h"
 #include "tests/support/temp_folder.h"
@@ -30,6 +32,9 @@ void write_hills(const std::string& path) {
     for (int c = 0; c < 24; ++c)
       file << std::round(200 + 150 * std::sin(0.9 * c + 0.2 * r) + 40 * std::cos(0.7 * r)) << ' ';
 }
+
+/// Other programs take seconds to start.
+const std::string kWithoutGrass = "PATH=/nowhere ";
 
 std::string read_text(const std::string& path) {
   std::ifstream file(path);
@@ -59,6 +64,35 @@ json point_of(const json& job, const std::string& method, const std::string& set
   return {};
 }
 
+/// Every figure of every point is a line of the table, with the command that repeats it.
+void expect_same_figures(const std::string& csv, const json& result) {
+  const auto quoted = [](const json& text) {
+    std::string out;
+    for (const char c : text.get<std::string>())
+      out += c == '"' ? std::string("\"\"") : std::string(1, c);
+    return '"' + out + '"';
+  };
+  std::multiset<std::string> lines;
+  std::istringstream text(csv);
+  for (std::string line; std::getline(text, line);) lines.insert(line);
+  std::size_t figures = 0;
+  for (const json& job : result["jobs"])
+    for (const json& p : job["points"]) {
+      EXPECT_NE(p["command"], "") << p;
+      for (const auto& [figure, value] : p["figures"].items()) {
+        ++figures;
+        std::ostringstream number;
+        number << std::setprecision(9) << value.get<double>();
+        const std::string line = job["name"].get<std::string>() + "," + quoted(p["method"]) + "," +
+                                 quoted(p["setting"]) + "," + (p["default"] ? "1" : "0") + "," +
+                                 (p["judge"] ? "1" : "0") + "," + figure + "," + number.str() +
+                                 "," + quoted(p["command"]);
+        EXPECT_EQ(lines.count(line), 1U) << line;
+      }
+    }
+  EXPECT_EQ(lines.size(), figures + 1);
+}
+
 void expect_whole_page(const std::string& folder, const json& result) {
   const std::string page = read_text(folder + "/compare.html");
   EXPECT_EQ(page.find("http"), page.find("http://www.w3.org/2000/svg")) << "needs the network";
@@ -72,6 +106,7 @@ void expect_whole_page(const std::string& folder, const json& result) {
       EXPECT_FALSE(chart["front"].empty()) << name;
     }
   EXPECT_EQ(json::parse(read_text(folder + "/compare.json")), result);
+  expect_same_figures(read_text(folder + "/compare.csv"), result);
 }
 
 TEST_F(CompareCommand, ChartsBothMethodsOfASceneAndCertifiedIsNeverWrong) {
@@ -87,12 +122,18 @@ TEST_F(CompareCommand, ChartsBothMethodsOfASceneAndCertifiedIsNeverWrong) {
     if (point["default"]) defaults.insert(point["method"]);
     EXPECT_GT(point["figures"]["seconds"], 0);
     EXPECT_GT(point["figures"]["bytes_a_triangle"], 0);
-    if (point["method"] == "certified") {
+    EXPECT_LE(point["figures"]["seconds_least"], point["figures"]["seconds"]);
+    EXPECT_LE(point["figures"]["seconds"], point["figures"]["seconds_most"]);
+    if (point["method"].get<std::string>().starts_with("certified")) {
       EXPECT_EQ(point["figures"]["falsely_culled_triangles"], 0);
       EXPECT_FALSE(point["unsafe"]);
     }
   }
   EXPECT_EQ(defaults, (std::set<std::string>{"certified"}));
+  std::set<std::string> methods;
+  for (const json& point : job["points"]) methods.insert(point["method"]);
+  EXPECT_EQ(methods, (std::set<std::string>{"thesis", "thesis, in squares", "certified",
+                                            "certified, in squares"}));
   EXPECT_GE(job["points"].size(), 10U);
   EXPECT_TRUE(job["left_out"].empty());
   expect_whole_page(out, result);
@@ -100,8 +141,8 @@ TEST_F(CompareCommand, ChartsBothMethodsOfASceneAndCertifiedIsNeverWrong) {
 
 TEST_F(CompareCommand, OfADemEveryJobIsThereAndWhatIsExactIsNeverWrong) {
   const std::string out = folder_->path("dem");
-  const RunResult run = run_scarp("$SCARP compare " + folder_->path("hills.asc") + " -o " + out +
-                                  " --eyes 1 --heights 2 --time 50s --json");
+  const RunResult run = run_scarp(kWithoutGrass + "$SCARP compare " + folder_->path("hills.asc") +
+                                  " -o " + out + " --eyes 1 --heights 2 --time 50s --json");
   ASSERT_EQ(run.exit_code, 0) << run.errors;
   const json result = json::parse(run.output);
   std::map<std::string, json> jobs;
@@ -118,6 +159,7 @@ TEST_F(CompareCommand, OfADemEveryJobIsThereAndWhatIsExactIsNeverWrong) {
         << point;
   }
   EXPECT_EQ(result["facts"].count("input hills.asc"), 1U);
+  EXPECT_EQ(jobs["viewshed"]["left_out"], json::array({"r.viewshed: GRASS is not installed"}));
   expect_whole_page(out, result);
 }
 
@@ -171,6 +213,51 @@ TEST(JobChart, DrawsAPointAtZeroAndEscapesWords) {
   EXPECT_EQ(svg.find("gamma"), std::string::npos);  // has no error
   EXPECT_EQ(svg.find("nan"), std::string::npos);
   EXPECT_EQ(svg.find("inf"), std::string::npos);
+}
+
+TEST(JobChart, ShowsTheSpreadOfRunsAndSharesFromZero) {
+  ComparedJob job;
+  job.charts = {{"s", "s", "e", "e", "", true}, {"s", "s", "e", "e", ""}};
+  const auto point = [](double error, double least, double most) {
+    return ComparedPoint{
+        "m",   "", {{"s", 2}, {"s_least", least}, {"s_most", most}, {"e", error}}, false, false,
+        false, ""};
+  };
+  const auto lines_of = [](const std::string& svg) {
+    std::size_t count = 0;
+    for (std::size_t at = 0; (at = svg.find("stroke-opacity=\"0.5\"", at)) != std::string::npos;
+         ++at)
+      ++count;
+    return count;
+  };
+  job.points = {point(50, 1, 3), point(100, 2, 2)};
+  const std::string shares = draw_chart(job, job.charts[0]);
+  EXPECT_EQ(lines_of(shares), 2U);
+  for (const char* mark : {">0<", ">20<", ">100<"})
+    EXPECT_NE(shares.find(mark), std::string::npos) << mark;
+  job.points = {point(0, 1, 3)};
+  for (const ComparedChart& chart : job.charts)
+    EXPECT_EQ(draw_chart(job, chart).find("nan"), std::string::npos);
+}
+
+TEST(JobChart, NamesFarPowersOfTenShortly) {
+  ComparedJob job;
+  job.charts = {{"s", "s", "e", "e", ""}};
+  job.points = {{"m", "", {{"s", 1e5}, {"e", 1e-6}}, false, false, false, ""},
+                {"m", "", {{"s", 1e8}, {"e", 10}}, false, false, false, ""}};
+  const std::string svg = draw_chart(job, job.charts[0]);
+  for (const char* mark : {">10\u2076<", ">10\u207b\u2075<", ">1<"})
+    EXPECT_NE(svg.find(mark), std::string::npos) << mark;
+}
+
+TEST(NameCommands, LeavesTheirOwnToThoseThatHaveThem) {
+  ComparedRun run;
+  run.facts["command"] = "all";
+  run.jobs.emplace_back().points = {{"a", "", {}, false, false, false, "own"},
+                                    {"b", "", {}, false, false, false, ""}};
+  name_commands(run);
+  EXPECT_EQ(run.jobs[0].points[0].command, "own");
+  EXPECT_EQ(run.jobs[0].points[1].command, "all");
 }
 
 TEST(ParetoFront, HoldsWhatNoOtherBeatsAndNeverTheJudge) {

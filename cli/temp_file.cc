@@ -1,4 +1,4 @@
-#include "cli/serve/temp_file.h"
+#include "cli/temp_file.h"
 
 #include <fmt/format.h>
 #include <stdlib.h>
