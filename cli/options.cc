@@ -5,7 +5,9 @@
 #include <charconv>
 #include <chrono>
 #include <cmath>
+#include <initializer_list>
 #include <string_view>
+#include <utility>
 
 #include "core/error/error.h"
 
@@ -25,6 +27,14 @@ bool take(std::string_view& text, std::string_view start) {
   if (!text.starts_with(start)) return false;
   text.remove_prefix(start.size());
   return true;
+}
+
+/// What the unit that text begins with stands for, the first of several; nothing where it is none.
+std::optional<double> take_unit(std::string_view& text,
+                                std::initializer_list<std::pair<std::string_view, double>> units) {
+  for (const auto& [unit, factor] : units)
+    if (take(text, unit)) return factor;
+  return {};
 }
 
 }  // namespace
@@ -67,13 +77,7 @@ std::pair<double, double> parse_range(const std::string& option, const std::stri
 double parse_frequency(const std::string& text) {
   std::string_view rest = text;
   const auto value = take_number(rest);
-  double factor = 1;
-  if (take(rest, "k"))
-    factor = 1e3;
-  else if (take(rest, "M"))
-    factor = 1e6;
-  else if (take(rest, "G"))
-    factor = 1e9;
+  const double factor = take_unit(rest, {{"k", 1e3}, {"M", 1e6}, {"G", 1e9}}).value_or(1);
   take(rest, "Hz");
   // From long waves to light; beyond it is a slip.
   if (!value || !rest.empty() || *value * factor < 1e3 || *value * factor > 1e15)
@@ -145,15 +149,9 @@ MapPoint to_map_point(const TypedPosition& typed, const std::string& crs, const 
 std::optional<double> parse_duration(const std::string& text) {
   std::string_view rest = text;
   const auto value = take_number(rest);
-  double unit_s = 0;
-  if (take(rest, "s"))
-    unit_s = 1;
-  else if (take(rest, "min"))
-    unit_s = 60;
-  else if (take(rest, "h"))
-    unit_s = 3600;
-  if (!value || unit_s == 0 || !rest.empty() || !(*value > 0)) return {};
-  return *value * unit_s;
+  const auto unit_s = take_unit(rest, {{"s", 1}, {"min", 60}, {"h", 3600}});
+  if (!value || !unit_s || !rest.empty() || !(*value > 0)) return {};
+  return *value * *unit_s;
 }
 
 void take_budget(const std::string& text, Budget& budget) {
@@ -174,16 +172,10 @@ void take_budget(const std::string& text, Budget& budget) {
 std::uint64_t parse_bytes(const std::string& text) {
   std::string_view rest = text;
   const auto value = take_number(rest);
-  double factor = 1;
-  if (take(rest, "K") || take(rest, "k"))
-    factor = 0x1p10;
-  else if (take(rest, "M"))
-    factor = 0x1p20;
-  else if (take(rest, "G"))
-    factor = 0x1p30;
-  else if (take(rest, "T"))
-    factor = 0x1p40;
-  if (factor > 1) take(rest, "i");
+  const auto unit =
+      take_unit(rest, {{"K", 0x1p10}, {"k", 0x1p10}, {"M", 0x1p20}, {"G", 0x1p30}, {"T", 0x1p40}});
+  const double factor = unit.value_or(1);
+  if (unit) take(rest, "i");
   take(rest, "B");
   if (!value || !rest.empty() || *value * factor < 1 || *value * factor > 0x1p62)
     throw Error(ErrorCode::kUsage,

@@ -52,6 +52,20 @@ double ComparedGround::cell_m() const {
   return std::min(samples.cell_x_m, samples.cell_y_m);
 }
 
+std::vector<std::uint32_t> ComparedGround::cell_corners() const {
+  std::vector<std::uint32_t> corners;
+  for (std::int32_t row = 0; row + 1 < samples.rows; ++row)
+    for (std::int32_t column = 0; column + 1 < samples.columns; ++column) {
+      if (!samples.is_ground_cell(column, row)) continue;
+      const auto at = [&](std::int32_t dc, std::int32_t dr) {
+        return static_cast<std::uint32_t>(samples.index(column + dc, row + dr));
+      };
+      for (const std::uint32_t i : {at(0, 0), at(0, 1), at(1, 0), at(1, 0), at(0, 1), at(1, 1)})
+        corners.push_back(i);
+    }
+  return corners;
+}
+
 std::string ComparedGround::typed(const Eye& eye, double height_m) const {
   return fmt::format("{:.10g},{:.10g},{:g}", dem.x_of(eye.column), dem.y_of(eye.row), height_m);
 }

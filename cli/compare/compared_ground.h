@@ -30,6 +30,8 @@ struct ComparedGround {
   std::vector<Eye> eyes;
 
   double cell_m() const;
+  /// Every ground cell as two triangles: samples, three a triangle.
+  std::vector<std::uint32_t> cell_corners() const;
   /// An eye as commands take it.
   std::string typed(const Eye& eye, double height_m) const;
   /// Known samples that are drawn at random, with repetition.

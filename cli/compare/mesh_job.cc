@@ -138,18 +138,9 @@ class MeshComparison {
     finish(std::move(point), time, over);
   }
 
-  /// Every ground cell as two triangles.
   void full_mesh() {
     const SampleGrid& grid = ground_.samples;
-    for (std::int32_t row = 0; row + 1 < grid.rows; ++row)
-      for (std::int32_t column = 0; column + 1 < grid.columns; ++column) {
-        if (!grid.is_ground_cell(column, row)) continue;
-        const auto at = [&](std::int32_t dc, std::int32_t dr) {
-          return static_cast<unsigned>(grid.index(column + dc, row + dr));
-        };
-        for (const unsigned i : {at(0, 0), at(0, 1), at(1, 0), at(1, 0), at(0, 1), at(1, 1)})
-          full_.push_back(i);
-      }
+    full_ = ground_.cell_corners();
     const Position& first = grid.positions.front();
     for (const Position& p : grid.positions)
       for (const double v : {p.x_m - first.x_m, p.y_m - first.y_m, p.z_m - first.z_m})
@@ -160,7 +151,7 @@ class MeshComparison {
   void peer(double error_m) {
     const std::size_t vertices = ground_.samples.positions.size();
     const float scale = meshopt_simplifyScale(places_.data(), vertices, 3 * sizeof(float));
-    std::vector<unsigned> kept(full_.size());
+    std::vector<std::uint32_t> kept(full_.size());
     std::size_t count = 0;
     const Timed time = timed(kComparedRuns, [&] {
       count = meshopt_simplify(kept.data(), full_.data(), full_.size(), places_.data(), vertices,
@@ -179,7 +170,7 @@ class MeshComparison {
   const ComparedGround& ground_;
   const Progress& progress_;
   ComparedJob job_;
-  std::vector<unsigned> full_;
+  std::vector<std::uint32_t> full_;  // every ground cell as two triangles
   std::vector<float> places_;
 };
 

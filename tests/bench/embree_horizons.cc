@@ -37,16 +37,7 @@ class EmbreeGround {
       *places++ = static_cast<float>(p.y_m - origin_.y_m);
       *places++ = static_cast<float>(p.z_m - origin_.z_m);
     }
-    std::vector<unsigned> corners;
-    for (std::int32_t row = 0; row + 1 < grid.rows; ++row)
-      for (std::int32_t column = 0; column + 1 < grid.columns; ++column) {
-        if (!grid.is_ground_cell(column, row)) continue;
-        const auto at = [&](std::int32_t dc, std::int32_t dr) {
-          return static_cast<unsigned>(grid.index(column + dc, row + dr));
-        };
-        for (const unsigned i : {at(0, 0), at(0, 1), at(1, 0), at(1, 0), at(0, 1), at(1, 1)})
-          corners.push_back(i);
-      }
+    const std::vector<std::uint32_t> corners = ground.cell_corners();
     auto* to = static_cast<unsigned*>(
         rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                 3 * sizeof(unsigned), corners.size() / 3));

@@ -10,17 +10,12 @@
 #include <random>
 
 #include "core/error/error.h"
+#include "tests/ingest/crs/frame_at.h"
 
 namespace scarp {
 namespace {
 
-FrameDescription frame_at(const std::string& crs, double x, double y) {
-  FrameDescription description;
-  description.crs_wkt = crs;
-  description.centre_x = x;
-  description.centre_y = y;
-  return description;
-}
+using test::frame_at;
 
 std::string refusal(const FrameDescription& description) {
   try {

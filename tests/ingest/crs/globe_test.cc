@@ -10,17 +10,12 @@
 #include <utility>
 
 #include "core/error/error.h"
+#include "tests/ingest/crs/frame_at.h"
 
 namespace scarp {
 namespace {
 
-FrameDescription frame_at(const std::string& crs, double x, double y) {
-  FrameDescription description;
-  description.crs_wkt = crs;
-  description.centre_x = x;
-  description.centre_y = y;
-  return description;
-}
+using test::frame_at;
 
 /// By PROJ through OGR, of a CRS with ellipsoidal heights.
 EcefPoint by_proj(const std::string& crs_3d, const MapPoint& at) {
