@@ -26,6 +26,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kEyesOfViewsheds = 3;
+/// Facts that name jobs begin so.
+constexpr char kLeftOut[] = "left out: ";
 /// Groups of a DEM are those of a mesh with so many vertices at most: certifying is what takes
 /// time.
 constexpr std::uint32_t kMostVertices = 8'000;
@@ -130,7 +132,7 @@ class Comparing {
       if (watch_.seconds() < options_.limit_s)
         run_.jobs.push_back(job(bar_.stage(name)));
       else
-        run_.facts["left out: " + std::string(name)] = "for lack of time";
+        run_.facts[kLeftOut + std::string(name)] = "for lack of time; give --time more";
     };
     compare("viewsheds",
             [&](const Progress& p) { return compare_viewsheds(ground, p, viewsheds); });
@@ -198,6 +200,8 @@ int run_compare(const CompareOptions& options) {
     return 0;
   }
   for (const ComparedJob& job : run.jobs) print_table(job);
+  for (const auto& [name, why] : run.facts)
+    if (name.starts_with(kLeftOut)) fmt::print("L{}, {}\n", name.substr(1), why);
   fmt::print("* default. Charts: {}/compare.html\n", options.output);
   return 0;
 }

@@ -136,8 +136,10 @@ class Drawing {
     line();
     for (const ComparedPoint& p : job_.points)
       if (is_drawn(p)) mark(p);
-    for (const ComparedPoint& p : job_.points)
-      if (is_drawn(p)) label(p);
+    // Defaults first: where it is crowded, others go without.
+    for (const bool is_default : {true, false})
+      for (const ComparedPoint& p : job_.points)
+        if (is_drawn(p) && p.is_default == is_default) label(p);
     const double height_px = legend();
     return svg_begin(kWidthPx, height_px) + svg_ + "</svg>\n";
   }
@@ -248,7 +250,8 @@ class Drawing {
     };
     for (const Place place :
          {Place{0, -1}, Place{0, 1}, Place{1, 0}, Place{-1, 0}, Place{1, -1}, Place{-1, -1},
-          Place{1, 1}, Place{-1, 1}, Place{0.3, -2.4}, Place{0.3, -3.6}}) {
+          Place{1, 1}, Place{-1, 1}, Place{-0.6, -1.2}, Place{-0.6, 1.2}, Place{0.6, -1.2},
+          Place{0.6, 1.2}, Place{0.3, -2.4}, Place{0.3, -3.6}}) {
       const double middle_x = x + place.dx * (gap + width / 2);
       const double middle_y = y + place.dy * (gap + kLabelPx / 2);
       const Box box{middle_x - width / 2, middle_y - kLabelPx / 2, middle_x + width / 2,
