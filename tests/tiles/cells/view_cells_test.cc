@@ -4,8 +4,11 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
+#include <iterator>
 #include <random>
 #include <set>
+#include <string>
 
 #include "core/sight/triangle_sight.h"
 #include "core/threads/parallel_for.h"
@@ -154,6 +157,21 @@ VdbFile small_file() {
   file.floats = {tops};
   file.metadata = {{"CRS", "LOCAL_CS[\"map\"]"}, {"EARTH", "flat"}};
   return file;
+}
+
+bool is_openvdb_loaded() {
+  std::ifstream maps("/proc/self/maps");
+  const std::string text{std::istreambuf_iterator<char>(maps), {}};
+  return text.find("openvdb") != std::string::npos;
+}
+/// Before any test of this program asked for it.
+const bool kIsLoadedFromTheStart = is_openvdb_loaded();
+
+TEST(VdbFile, TakesOpenVdbIntoMemoryOnlyWhenItIsWanted) {
+  EXPECT_FALSE(kIsLoadedFromTheStart);
+  const test::TempFolder folder;
+  write_vdb(folder.path("cells.vdb"), small_file(), Existing::kRefuse);
+  EXPECT_TRUE(is_openvdb_loaded());
 }
 
 TEST(VdbFile, ReadsBackWhatWasWrittenAndCollapsesEqualBlocks) {
