@@ -50,6 +50,25 @@ const page = {
       $('busy').hidden = true;
     }
   },
+  /**
+   * Asks, and shows the answer, or null and what went wrong: also where the question cannot be put.
+   * An answer that comes when nobody wants it any more changes nothing.
+   * @param {{ask: () => Promise<Response>, stop: () => void, is_wanted: () => boolean,
+   *   show: (answer: ?object) => void}} question
+   */
+  async answer({ask, stop, is_wanted, show}) {
+    try {
+      const response = await page.busy(ask, stop);
+      const answer = await response.json();
+      if (!is_wanted()) return;
+      page.calm();
+      show(answer);
+    } catch (error) {
+      if (error.name === 'AbortError') return;
+      show(null);
+      page.trouble(error);
+    }
+  },
 };
 
 const tools = {

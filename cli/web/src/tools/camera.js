@@ -62,18 +62,13 @@ export class CameraTool {
     return ((north - south) * 111_000) / 6;
   }
 
-  async #question(state, signal) {
-    try {
-      const response = await this.page.busy(() => execute('cull', cull_inputs(state), {signal}), () => this.#newest.stop());
-      const answer = await response.json();
-      if (this.page.store.state.tool !== 'camera' || !this.page.store.state.camera) return;
-      this.page.calm();
-      this.#show(answer);
-    } catch (error) {
-      if (error.name === 'AbortError') return;
-      this.#show(null);
-      this.page.trouble(error);
-    }
+  #question(state, signal) {
+    return this.page.answer({
+      ask: () => execute('cull', cull_inputs(state), {signal}),
+      stop: () => this.#newest.stop(),
+      is_wanted: () => this.page.store.state.tool === 'camera' && Boolean(this.page.store.state.camera),
+      show: (answer) => this.#show(answer),
+    });
   }
 
   #show(answer) {

@@ -51,18 +51,13 @@ export class HorizonTool {
     this.#show(null);
   }
 
-  async #question(state, signal) {
-    try {
-      const response = await this.page.busy(() => execute('horizon', horizon_inputs(state), {signal}), () => this.#newest.stop());
-      const answer = await response.json();
-      if (this.page.store.state.tool !== 'horizon' || !this.page.store.state.point) return;
-      this.page.calm();
-      this.#show({...answer, at: state.point});
-    } catch (error) {
-      if (error.name === 'AbortError') return;
-      this.#show(null);
-      this.page.trouble(error);
-    }
+  #question(state, signal) {
+    return this.page.answer({
+      ask: () => execute('horizon', horizon_inputs(state), {signal}),
+      stop: () => this.#newest.stop(),
+      is_wanted: () => this.page.store.state.tool === 'horizon' && Boolean(this.page.store.state.point),
+      show: (answer) => this.#show(answer && {...answer, at: state.point}),
+    });
   }
 
   #show(answer) {

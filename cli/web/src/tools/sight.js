@@ -52,24 +52,23 @@ export class SightTool {
     this.handles.from.put(on ? state.from : null);
     this.handles.to.put(on ? state.to : null);
     $('tool-sight').querySelector('[data-empty]').hidden = Boolean(state.from && state.to);
-    if (on && state.from && state.to) return this.#newest.ask((signal) => this.#question(state, signal));
+    if (this.#is_asked()) return this.#newest.ask((signal) => this.#question(state, signal));
     this.#newest.stop();
     this.#show(null);
   }
 
-  async #question(state, signal) {
-    try {
-      const response = await this.page.busy(() => execute('line-of-sight', sight_inputs(state), {signal}), () => this.#newest.stop());
-      const answer = await response.json();
-      const now = this.page.store.state;
-      if (now.tool !== 'sight' || !now.from || !now.to) return;
-      this.page.calm();
-      this.#show({...answer, from: state.from, to: state.to});
-    } catch (error) {
-      if (error.name === 'AbortError') return;
-      this.#show(null);
-      this.page.trouble(error);
-    }
+  #is_asked() {
+    const {tool, from, to} = this.page.store.state;
+    return Boolean(tool === 'sight' && from && to);
+  }
+
+  #question(state, signal) {
+    return this.page.answer({
+      ask: () => execute('line-of-sight', sight_inputs(state), {signal}),
+      stop: () => this.#newest.stop(),
+      is_wanted: () => this.#is_asked(),
+      show: (answer) => this.#show(answer && {...answer, from: state.from, to: state.to}),
+    });
   }
 
   #show(answer) {
