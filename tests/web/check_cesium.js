@@ -64,7 +64,7 @@ function flight() {
   });
 }
 
-const cesium = join(dirname(fileURLToPath(import.meta.url)), "node_modules/cesium/Build/Cesium/");
+const cesium = join(dirname(fileURLToPath(import.meta.url)), "../node_modules/cesium/Build/Cesium/");
 const here = dirname(fileURLToPath(import.meta.url));
 const runtime = process.env.SCARP_RUNTIME ?? join(here, "../../tiles/runtime");
 const hasRuntime = existsSync(join(runtime, "scarp.mjs"));

@@ -66,7 +66,7 @@ export function browser_or_reason() {
       }),
     };
   } catch {
-    return {reason: 'playwright-core is not there: npm ci in tests/page'};
+    return {reason: 'playwright-core is not there: npm ci in tests'};
   }
 }
 
