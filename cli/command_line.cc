@@ -398,10 +398,10 @@ void add_compare(CLI::App& app, CompareOptions& o, std::function<int()>& run) {
       "Examples:\n  scarp compare alps.tif -o alps-compared --time 5min\n"
       "  scarp compare alps.scene -o alps-compared\n"
       "Of a DEM, in a square around its middle: viewsheds, least heights, horizons, meshes and\n"
-      "groups, by every method and setting, against the exact judge. Of a scene: its groups,\n"
-      "prepared anew with several settings. Writes compare.html (charts and tables), the charts\n"
-      "as SVG, compare.csv and compare.json. What would not fit into the time is left out and\n"
-      "named.");
+      "groups, by every method and setting, GDAL and GRASS (where it is installed) among them,\n"
+      "against the exact judge. Of a scene: its groups, prepared anew with several settings.\n"
+      "Writes compare.html (charts and tables), the charts as SVG, compare.csv and compare.json.\n"
+      "What would not fit into the time is left out and named.");
   add_sources(*c, o.sources);
   c->add_option("-o,--output", o.output, "A new folder")->required();
   c->add_option("--eyes", o.eyes, "Random eyes for each height; 4 unless given")
