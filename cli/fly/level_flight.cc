@@ -32,7 +32,7 @@ void LevelFlight::see(const Shot& shot, std::size_t contender, std::span<const G
 }
 
 void LevelFlight::refine(const Shot& shot, std::span<const GroupIndex> groups, LevelSum& sum) {
-  const Stopwatch watch;
+  const ProcessorStopwatch watch;
   auto drawing = refinement_->draw(shot, plan_.refine_px, groups);
   sum.refined += drawing.triangles.size();
   refinement_->leave_out_hidden(shot, drawing);

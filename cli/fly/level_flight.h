@@ -24,7 +24,7 @@ struct LevelSum {
   std::uint64_t refined = 0;       ///< triangles in the picture over groups that may be seen
   std::uint64_t over_outline = 0;  ///< of those, not under the outline of nearer ones
   std::uint64_t other_px = 0;      ///< pixels with another triangle than refined without culling
-  double refine_ms = 0;            ///< to refine and to find the outline
+  double refine_ms = 0;            ///< of the processor, to refine and to find the outline
   std::uint64_t in_budget = 0;     ///< triangles drawn at the levels that the budget allows
   std::array<std::uint64_t, kDrawnLevels> level_px{};  ///< pixels by the level of what they show
 };
