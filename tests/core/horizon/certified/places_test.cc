@@ -46,7 +46,9 @@ TEST(Places, AnswerForEachOfThemBitForBit) {
                    Places(std::span(&p, 1)).least_rises(apart.line(), curtain.line()).curtain);
     }
     EXPECT_EQ(together.is_held(), apart.is_held()) << "seed " << seed;
-    if (apart.is_held()) EXPECT_EQ(together.plane(a, b).ahead, apart.plane(a, b).ahead);
+    if (apart.is_held()) {
+      EXPECT_EQ(together.plane(a, b).ahead, apart.plane(a, b).ahead);
+    }
     const Places::Rises rises = places.least_rises(together.line(), curtain.line());
     EXPECT_EQ(rises.edge, places.least_rise(together.line()));
     EXPECT_EQ(rises.curtain, curtain_slope);
