@@ -38,10 +38,20 @@ void mark_wanted_now(const float* bounds, const std::uint16_t* hints, const Cell
   }
 }
 
+/// Elsewhere masked loads and stores touch whole vectors, where other threads may write, and want
+/// them aligned.
+constexpr bool kMasksMemory =
+    HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL;
+
 void lower_useless_now(const CellRun* runs, const float* best, std::size_t count,
                        const std::uint16_t* hints, float* bounds) {
   const std::size_t lanes = hn::Lanes(kFloats);
   for (std::size_t r = 0; r < count; ++r) {
+    if constexpr (!kMasksMemory) {
+      for (std::size_t at = runs[r].begin; at < runs[r].begin + runs[r].count; ++at)
+        if (!(bounds[at] > slope_of_hint(hints[at])) && best[r] < bounds[at]) bounds[at] = best[r];
+      continue;
+    }
     const auto least = hn::Set(kFloats, best[r]);
     for (std::size_t i = 0; i < runs[r].count; i += lanes) {
       const std::size_t at = runs[r].begin + i;
