@@ -113,13 +113,27 @@ void Ridges::cross(const RidgeEdges& ridges, const FanView& view, double width_m
               [](const RidgeCrossing& a, const RidgeCrossing& b) {
                 return a.u_m < b.u_m || (a.u_m == b.u_m && a.edge < b.edge);
               });
+  highest_.assign(first_highest(strips), -HUGE_VALF);
+  for (std::size_t s = 0; s < strips; ++s)
+    for (std::size_t i = first_[s]; i < first_[s + 1]; ++i) {
+      float& highest = highest_[first_highest(s) + (i - first_[s]) / kCrossingsAtOnce];
+      highest = std::max(highest, crossings_[i].z_m);
+    }
+}
+
+std::size_t Ridges::strip_at(double v_m) const {
+  const double strip = (v_m - low_v_m_) / width_m_ - static_cast<double>(first_strip_);
+  return static_cast<std::size_t>(std::clamp(strip, 0.0, static_cast<double>(first_.size() - 2)));
 }
 
 std::span<const RidgeCrossing> Ridges::along(double v_m) const {
-  const double strip = (v_m - low_v_m_) / width_m_ - static_cast<double>(first_strip_);
-  const auto s =
-      static_cast<std::size_t>(std::clamp(strip, 0.0, static_cast<double>(first_.size() - 2)));
+  const std::size_t s = strip_at(v_m);
   return {crossings_.data() + first_[s], first_[s + 1] - first_[s]};
+}
+
+std::span<const float> Ridges::highest_along(double v_m) const {
+  const std::size_t s = strip_at(v_m), count = first_[s + 1] - first_[s];
+  return {highest_.data() + first_highest(s), (count + kCrossingsAtOnce - 1) / kCrossingsAtOnce};
 }
 
 }  // namespace scarp

@@ -34,6 +34,8 @@ struct RidgeCrossing {
   std::uint32_t edge;  ///< into RidgeEdges::edges
 };
 
+inline constexpr std::size_t kCrossingsAtOnce = 16;
+
 /// The part of a fan's frame from which ridges are looked for: ahead of low_u_m, in strips that
 /// hold v from low_v_m to high_v_m.
 struct RidgeRange {
@@ -52,12 +54,21 @@ class Ridges {
 
   /// The crossings of the strip that holds v. Requires v in the range.
   std::span<const RidgeCrossing> along(double v_m) const;
+  /// The greatest height of each kCrossingsAtOnce of them.
+  std::span<const float> highest_along(double v_m) const;
 
  private:
+  std::size_t strip_at(double v_m) const;
+  /// Where a strip's greatest heights begin.
+  std::size_t first_highest(std::size_t strip) const {
+    return first_[strip] / kCrossingsAtOnce + strip;
+  }
+
   double low_v_m_ = 0, width_m_ = 1;
   std::ptrdiff_t first_strip_ = 0;
   std::vector<std::size_t> first_;  // [strips + 1]
   std::vector<RidgeCrossing> crossings_;
+  std::vector<float> highest_;
   // For cross: the strips of each edge, and where a strip's next crossing goes.
   std::vector<std::int32_t> first_edge_strip_, end_edge_strip_;
   std::vector<std::size_t> next_;

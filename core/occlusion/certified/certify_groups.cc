@@ -58,6 +58,38 @@ float worth_of_rings(const float* middle_m, const float* low_m, const float* wei
   return sum;
 }
 
+/// The same for each ring with a slope of its own.
+SCARP_FOR_EACH_TARGET
+void worth_of_each(const float* middle_m, const float* low_m, const float* weight,
+                   const float* slopes, std::size_t count, float* worth) {
+  for (std::size_t k = 0; k < count; ++k) {
+    const float above_m = slopes[k] * middle_m[k] - low_m[k];
+    const float high_m = above_m > 0 ? above_m : 0;
+    const float reach_m =
+        high_m < static_cast<float>(kHeadroomM) ? high_m : static_cast<float>(kHeadroomM);
+    const float of_ring = weight[k] * std::sqrt(reach_m);
+    worth[k] = slopes[k] > -std::numeric_limits<float>::infinity() ? of_ring : 0;
+  }
+}
+
+/// The first of the least numbers.
+SCARP_FOR_EACH_TARGET
+std::size_t least_index(const double* numbers, std::size_t count) {
+  double least[kParts];
+  for (double& lane : least) lane = HUGE_VAL;
+  std::size_t k = 0;
+  for (; k + kParts <= count; k += kParts)
+    for (std::size_t j = 0; j < kParts; ++j)
+      least[j] = numbers[k + j] < least[j] ? numbers[k + j] : least[j];
+  for (; k < count; ++k) least[0] = numbers[k] < least[0] ? numbers[k] : least[0];
+  for (std::size_t half = kParts / 2; half > 0; half /= 2)
+    for (std::size_t j = 0; j < half; ++j)
+      least[j] = least[j + half] < least[j] ? least[j + half] : least[j];
+  std::size_t i = 0;
+  while (i + 1 < count && !(numbers[i] <= least[0])) ++i;
+  return i;
+}
+
 /// What bounds are worth in one sector: how many cameras they can hide.
 class Worth {
  public:
@@ -95,6 +127,12 @@ class Worth {
                                               static_cast<float>(slope), first, last + 1));
   }
 
+  /// Of a slope for each of some rings.
+  void of_each(const float* slopes, std::size_t first, std::size_t count, float* worth) const {
+    worth_of_each(middle_m_.data() + first, low_m_.data() + first, weight_.data() + first, slopes,
+                  count, worth);
+  }
+
  private:
   const LeastGround& ground_;
   const Circle circle_;
@@ -110,11 +148,13 @@ class Worth {
 class Joining {
  public:
   Joining(const Worth& worth, std::span<const float> slopes) : worth_(worth) {
-    for (std::size_t k = 0; k < kRings; ++k) {
-      const auto slope = static_cast<double>(slopes[k]);
-      runs_.push_back({static_cast<std::int32_t>(k), slope, worth.of(slope, k, k)});
-    }
-    join_cheapest();
+    std::array<float, kRings> each;
+    worth.of_each(slopes.data(), 0, kRings, each.data());
+    runs_.reserve(kRings);
+    for (std::size_t k = 0; k < kRings; ++k)
+      runs_.push_back({static_cast<std::int32_t>(k), static_cast<double>(slopes[k]),
+                       static_cast<double>(each[k])});
+    join_cheapest(slopes);
   }
 
   std::array<Run, kSteps> join() const {
@@ -160,16 +200,24 @@ class Joining {
                 next.worth};
   }
 
-  void join_cheapest() {
-    std::vector<double> loss(runs_.size() - 1);
+  /// @param slopes  of the rings, which are the runs at first
+  void join_cheapest(std::span<const float> slopes) {
+    std::vector<double> loss(kRings - 1);
     const auto weigh = [&](std::size_t i) {
       loss[i] = runs_[i].worth + runs_[i + 1].worth -
                 joined(runs_[i], runs_[i + 1], last_of(i + 1)).worth;
     };
-    for (std::size_t i = 0; i < loss.size(); ++i) weigh(i);
+    // Two rings are joined by the lesser slope, which the other ring loses by.
+    std::array<float, kRings> lower, before, after;
+    for (std::size_t k = 0; k + 1 < kRings; ++k) lower[k] = std::min(slopes[k], slopes[k + 1]);
+    worth_.of_each(lower.data(), 0, kRings - 1, before.data());
+    worth_.of_each(lower.data(), 1, kRings - 1, after.data());
+    for (std::size_t i = 0; i < loss.size(); ++i)
+      loss[i] = runs_[i].worth + runs_[i + 1].worth -
+                (slopes[i + 1] >= slopes[i] ? runs_[i].worth + static_cast<double>(after[i])
+                                            : static_cast<double>(before[i]) + runs_[i + 1].worth);
     while (runs_.size() > kFewRuns) {
-      const auto i =
-          static_cast<std::size_t>(std::min_element(loss.begin(), loss.end()) - loss.begin());
+      const std::size_t i = least_index(loss.data(), loss.size());
       runs_[i] = joined(runs_[i], runs_[i + 1], last_of(i + 1));
       runs_.erase(runs_.begin() + static_cast<std::ptrdiff_t>(i) + 1);
       loss.erase(loss.begin() + static_cast<std::ptrdiff_t>(i));

@@ -423,6 +423,30 @@ class Bounding {
     return cell;
   }
 
+  /// The first crossing from one on that is over a line. Most are not: many are passed at once,
+  /// where the line is over the highest of them where it is lowest.
+  static std::ptrdiff_t first_over(std::span<const RidgeCrossing> crossings,
+                                   std::span<const float> highest, const Places::Line& line,
+                                   std::size_t i) {
+    const auto is_over = [&](float z_m, float u_m) {
+      return static_cast<double>(z_m) > line.base_m + line.slope * static_cast<double>(u_m);
+    };
+    if (!(line.slope > -HUGE_VAL)) return static_cast<std::ptrdiff_t>(i);
+    while (i < crossings.size()) {
+      if (i % kCrossingsAtOnce == 0) {
+        const std::size_t end = std::min(i + kCrossingsAtOnce, crossings.size());
+        const float lowest_u_m = crossings[line.slope > 0 ? i : end - 1].u_m;
+        if (!is_over(highest[i / kCrossingsAtOnce], lowest_u_m)) {
+          i = end;
+          continue;
+        }
+      }
+      if (is_over(crossings[i].z_m, crossings[i].u_m)) break;
+      ++i;
+    }
+    return static_cast<std::ptrdiff_t>(i);
+  }
+
   /// Raises walls for the rays over a piece on the ridges that its middle ray sees.
   void raise_walls(Look& look, const ExitPiece& piece, const PieceTargets& targets,
                    std::size_t lane) {
@@ -471,14 +495,13 @@ class Bounding {
       return true;
     };
     const auto crossings = look.ridges.along((piece.a.v_m + piece.b.v_m) / 2);
+    const auto highest = look.ridges.highest_along((piece.a.v_m + piece.b.v_m) / 2);
     auto next = std::upper_bound(
         crossings.begin(), crossings.end(), std::max(piece.a.u_m, piece.b.u_m),
         [](double u_m, const RidgeCrossing& c) { return u_m < static_cast<double>(c.u_m); });
     for (look.failures = 0; ring < open_end; ++next) {
-      while (next != crossings.end() && line.slope > -HUGE_VAL &&
-             !(static_cast<double>(next->z_m) >
-               line.base_m + line.slope * static_cast<double>(next->u_m)))
-        ++next;
+      next = crossings.begin() + first_over(crossings, highest, line,
+                                            static_cast<std::size_t>(next - crossings.begin()));
       const bool is_last = next == crossings.end();
       const std::size_t end =
           is_last ? open_end : ring_beyond(static_cast<double>(next->u_m), ring);
@@ -510,16 +533,16 @@ class Bounding {
                        std::span<const std::uint32_t> candidates) {
     if (is_passed(look, piece)) return;
     const std::size_t lane = reach_from(look, piece);
-    if (!look.reached().is_open(0, kRings)) return look.reached().lower(look.bounds);
+    if (!look.reached().is_open()) return look.reached().lower(look.bounds);
     PieceTargets& targets = look.targets[look.depth];
     find_targets(look.view, piece, look.crests, candidates, targets);
     if (targets.plane) {
       look.planes.assign(1, in_cells(look, *targets.plane));
       look.reached().raise(look.planes, 0);
-      if (!look.reached().is_open(0, kRings)) return look.reached().lower(look.bounds);
+      if (!look.reached().is_open()) return look.reached().lower(look.bounds);
     }
     raise_walls(look, piece, targets, lane);
-    if (!look.reached().is_open(0, kRings)) return look.reached().lower(look.bounds);
+    if (!look.reached().is_open()) return look.reached().lower(look.bounds);
     const double du_m = piece.b.u_m - piece.a.u_m, dv_m = piece.b.v_m - piece.a.v_m;
     const double size_m = options_.piece * look.unit_m;
     if (look.depth < kMostHalvings && du_m * du_m + dv_m * dv_m > size_m * size_m) {

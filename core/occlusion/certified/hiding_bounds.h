@@ -53,7 +53,8 @@ struct HidingBounds {
 ///
 /// Side: never more than is hidden. The same bits for any number of threads.
 /// Requires tin.neighbours, a group or kNone for each triangle, groups that have one.
-/// Cost: about fans * 1.5 us a triangle, and 384 bytes for each group and sector.
+/// Cost: about fans * 0.7 us a triangle on 16,000 triangles and twice that on 300,000, where rays
+/// meet more ridges; 384 bytes for each group and sector.
 /// Source: own; supporting planes as in Law and Tan 1999, for one ridge and all of a group's
 /// ground.
 /// @param own_triangles  of a tile in a scene: these come first, and only they have groups. The

@@ -58,14 +58,6 @@ void raise_rings(const RingTable& rings, const RingRow& forward, const CellPlane
   for (std::size_t k = first; k < kRings; ++k) best[k] = best[k] < least[k] ? least[k] : best[k];
 }
 
-/// Whether one of some numbers is less than another.
-SCARP_FOR_EACH_TARGET
-bool is_any_less(const float* numbers, const float* others, std::size_t count) {
-  std::int32_t any = 0;
-  for (std::size_t k = 0; k < count; ++k) any |= numbers[k] < others[k] ? 1 : 0;
-  return any != 0;
-}
-
 SCARP_FOR_EACH_TARGET
 bool is_any_raised(const float* best, const float* wanted, const float* inverse, float rise,
                    float slope, std::size_t count) {
@@ -169,7 +161,7 @@ void visit_marked(const std::uint64_t* marks, const CellRun& run, Visit visit) {
 
 void ReachedCells::make_room(std::size_t size) {
   if (cell_.size() >= size) return;
-  cell_.resize(size), turn_.resize(size);
+  cell_.resize(size), turn_.resize(size), ring_.resize(size), taken_.resize(size);
   for (auto* column : {&near_inverse_, &far_inverse_, &forward_, &low_x_, &low_y_, &high_x_,
                        &high_y_, &best_, &wanted_, &least_})
     column->resize(size);
@@ -217,7 +209,7 @@ void ReachedCells::reach(const RingTable& rings, const Turns& turns,
         if (!(bound > slope_of_hint(known.least[cell]))) return;
         const std::size_t i = wanted++;
         const SectorBorders& border = borders[cell - k * borders.size()];
-        cell_[i] = cell;
+        cell_[i] = cell, ring_[i] = static_cast<std::uint16_t>(k);
         turn_[i] = static_cast<std::int16_t>(turn + static_cast<std::int32_t>(cell - run.begin));
         near_inverse_[i] = rings.near_inverse[k], far_inverse_[i] = rings.far_inverse[k];
         forward_[i] = forward_row[k];
@@ -230,6 +222,7 @@ void ReachedCells::reach(const RingTable& rings, const Turns& turns,
     }
   }
   first_[kRings] = wanted;
+  open_end_ = wanted;
 }
 
 void ReachedCells::reach_part(const ReachedCells& whole, std::size_t low, std::size_t high) {
@@ -239,23 +232,30 @@ void ReachedCells::reach_part(const ReachedCells& whole, std::size_t low, std::s
   has_runs_ = false;
   const auto& first_turn = turns_->first[low];
   const auto& last_turn = turns_->last[high];
-  std::uint32_t size = 0;
-  for (std::size_t k = 0; k < kRings; ++k) {
-    first_[k] = size;
-    for (std::size_t i = whole.first_[k]; i < whole.first_[k + 1]; ++i) {
-      if (whole.turn_[i] < first_turn[k] || whole.turn_[i] > last_turn[k] ||
-          !(whole.best_[i] < whole.wanted_[i]))
-        continue;
-      cell_[size] = whole.cell_[i], turn_[size] = whole.turn_[i];
-      near_inverse_[size] = rings_->near_inverse[k], far_inverse_[size] = rings_->far_inverse[k];
-      forward_[size] = forward()[k];
-      low_x_[size] = whole.low_x_[i], low_y_[size] = whole.low_y_[i];
-      high_x_[size] = whole.high_x_[i], high_y_[size] = whole.high_y_[i];
-      best_[size] = whole.best_[i], wanted_[size] = whole.wanted_[i];
-      ++size;
-    }
+  const RingRow& forward_row = forward();
+  // Without branches: which cells are left follows no pattern.
+  std::array<std::uint32_t, kRings> in_ring{};
+  std::size_t size = 0;
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    const std::size_t k = whole.ring_[i];
+    taken_[size] = static_cast<std::uint32_t>(i);
+    const unsigned is_taken = static_cast<unsigned>(whole.turn_[i] >= first_turn[k]) &
+                              static_cast<unsigned>(whole.turn_[i] <= last_turn[k]) &
+                              static_cast<unsigned>(whole.best_[i] < whole.wanted_[i]);
+    size += is_taken;
+    in_ring[k] += is_taken;
   }
-  first_[kRings] = size;
+  for (std::size_t k = 0; k < kRings; ++k) first_[k + 1] = first_[k] + in_ring[k];
+  for (std::size_t j = 0; j < size; ++j) {
+    const std::size_t i = taken_[j], k = whole.ring_[i];
+    cell_[j] = whole.cell_[i], turn_[j] = whole.turn_[i], ring_[j] = whole.ring_[i];
+    near_inverse_[j] = whole.near_inverse_[i], far_inverse_[j] = whole.far_inverse_[i];
+    forward_[j] = forward_row[k];
+    low_x_[j] = whole.low_x_[i], low_y_[j] = whole.low_y_[i];
+    high_x_[j] = whole.high_x_[i], high_y_[j] = whole.high_y_[i];
+    best_[j] = whole.best_[i], wanted_[j] = whole.wanted_[i];
+  }
+  open_end_ = size;
 }
 
 void ReachedCells::raise(std::span<const CellPlane> planes, std::size_t first) {
@@ -267,16 +267,9 @@ void ReachedCells::raise(std::span<const CellPlane> planes, std::size_t first) {
               ring_best_.data());
 }
 
-bool ReachedCells::is_open(std::size_t first, std::size_t end) const {
-  return is_any_less(best_.data() + first_[first], wanted_.data() + first_[first],
-                     first_[end] - first_[first]);
-}
-
-std::size_t ReachedCells::end_of_open() const {
-  std::size_t i = size();
-  while (i > 0 && !(best_[i - 1] < wanted_[i - 1])) --i;
-  return static_cast<std::size_t>(std::lower_bound(first_.begin(), first_.end(), i) -
-                                  first_.begin());
+std::size_t ReachedCells::end_of_open() {
+  while (open_end_ > 0 && !(best_[open_end_ - 1] < wanted_[open_end_ - 1])) --open_end_;
+  return open_end_ > 0 ? ring_[open_end_ - 1] + std::size_t{1} : 0;
 }
 
 bool ReachedCells::is_promising(float rise, float slope, std::size_t first, std::size_t end) const {

@@ -84,11 +84,10 @@ class ReachedCells {
   /// Raises what is known of rings from `first` on to the lowest of some planes.
   void raise(std::span<const CellPlane> planes, std::size_t first);
 
-  /// Whether a bound is short of what is of use, in rings from `first` to `end`.
-  bool is_open(std::size_t first, std::size_t end) const;
-
-  /// One past the last ring with such a bound.
-  std::size_t end_of_open() const;
+  /// One past the last ring with a bound that is short of what is of use; 0 where there is none.
+  /// Cost: O(1) over all calls for each cell, because bounds only rise.
+  std::size_t end_of_open();
+  bool is_open() { return end_of_open() > 0; }
 
   /// Whether a line that rises by `slope`, and is `rise` over the group's height at its centre, is
   /// over one of these bounds by more than a tolerance.
@@ -109,6 +108,9 @@ class ReachedCells {
   std::array<std::uint32_t, kRings + 1> first_{};  // of each ring
   std::vector<std::uint32_t> cell_;                // in the group's bounds
   std::vector<std::int16_t> turn_;
+  std::vector<std::uint16_t> ring_;
+  std::vector<std::uint32_t> taken_;  // of the whole, for a part
+  std::size_t open_end_ = 0;          // no cell from here on is open
   std::vector<float> near_inverse_, far_inverse_, forward_;
   std::vector<float> low_x_, low_y_, high_x_, high_y_;  // SectorBorders
   std::vector<float> best_, wanted_, least_;

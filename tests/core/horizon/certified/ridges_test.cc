@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -43,6 +44,30 @@ TEST(Ridges, ARangeHoldsWhatIsAheadOfItAndNothingElseChanges) {
     }
   }
   EXPECT_GT(compared, 1000U);
+}
+
+TEST(Ridges, TellTheHighestOfCrossingsThatAreTakenAtOnce) {
+  const Tin tin = test::triangulated(test::random_hills(40, 33, 10, 5, 80, 0.01, 0.1), 3);
+  const RidgeEdges edges = ridge_edges_of(tin);
+  FanView view;
+  Ridges ridges;
+  std::size_t most = 0;
+  for (std::int32_t i = 0; i < 8; ++i) {
+    view_along(fan_of(8, i), tin, 140, 120, view);
+    ridges.cross(edges, view, 7, kAll);
+    for (double v_m = view.low_v_m; v_m < view.high_v_m; v_m += 3) {
+      const auto crossings = ridges.along(v_m);
+      std::vector<float> highest;
+      for (std::size_t at = 0; at < crossings.size(); ++at) {
+        if (at % kCrossingsAtOnce == 0) highest.push_back(crossings[at].z_m);
+        highest.back() = std::max(highest.back(), crossings[at].z_m);
+      }
+      const auto told = ridges.highest_along(v_m);
+      EXPECT_EQ(std::vector<float>(told.begin(), told.end()), highest) << v_m;
+      most = std::max(most, highest.size());
+    }
+  }
+  EXPECT_GT(most, 1U);
 }
 
 }  // namespace
