@@ -1,6 +1,8 @@
 #include "tests/stability/compare_methods.h"
 
 #include <algorithm>
+#include <cassert>
+#include <utility>
 
 #include "core/culling/certified_culling.h"
 #include "core/culling/visible_groups.h"
@@ -22,8 +24,31 @@ void count(const GroupedScene& scene, const std::vector<TriangleSight>& sight,
       culled_triangles(scene.groups, method.visible({eye, {}}));
   for (std::size_t t = 0; t < sight.size(); ++t) {
     counts.falsely_culled += culled[t] && sight[t] == TriangleSight::kVisible;
-    counts.culled_of_hidden += culled[t] && !group_seen[scene.groups.group_of_triangle[t]];
+    const GroupIndex group = scene.groups.group_of_triangle[t];
+    counts.culled_of_hidden += culled[t] && group != kNone && !group_seen[group];
   }
+}
+
+/// The groups of all tiles one after the other, as if they were one scene's.
+void group_tiles(const StabilityScene& scene, const HidingOptions& options, GroupedScene& grouped) {
+  const TiledScene tiles = tiled(scene, options);
+  LeafGroups leaves;
+  leaves.group_of_triangle.assign(grouped.tin.triangles.size(), kNone);
+  CertifiedRegions regions;
+  for (const TileOfScene& tile : tiles.tiles) {
+    for (const auto& members : tile.members) {
+      for (const TriangleIndex t : members) leaves.group_of_triangle[t] = leaves.count;
+      ++leaves.count;
+    }
+    assert(regions.groups.empty() || regions.layout == tile.regions.layout);
+    regions.layout = tile.regions.layout;
+    regions.groups.insert(regions.groups.end(), tile.regions.groups.begin(),
+                          tile.regions.groups.end());
+    regions.steps.insert(regions.steps.end(), tile.regions.steps.begin(), tile.regions.steps.end());
+  }
+  grouped.groups =
+      build_group_tree(grouped.tin, stewart_horizons(grouped.tin.vertices, {}, {}), leaves);
+  grouped.groups.certified = std::move(regions);
 }
 
 }  // namespace
@@ -31,6 +56,10 @@ void count(const GroupedScene& scene, const std::vector<TriangleSight>& sight,
 GroupedScene group_scene(const StabilityScene& scene, const HidingOptions& options) {
   GroupedScene grouped{scene.tin, {}};
   if (scene.tin.triangles.empty()) return grouped;
+  if (scene.tile_samples > 0) {
+    group_tiles(scene, options, grouped);
+    return grouped;
+  }
   const LeafGroups leaves = group_by_squares(grouped.tin, scene.group_triangles);
   grouped.groups =
       build_group_tree(grouped.tin, stewart_horizons(grouped.tin.vertices, {}, {}), leaves);
@@ -75,8 +104,12 @@ SceneCounts compare_methods(const StabilityScene& scene, const ComparisonOptions
     std::vector<std::uint8_t> group_seen(grouped.groups.leaf_count, 0);
     const auto& group_of = grouped.groups.group_of_triangle;
     for (std::size_t t = 0; t < sight.size(); ++t)
-      if (sight[t] == TriangleSight::kVisible) ++counts.visible, group_seen[group_of[t]] = 1;
-    for (const GroupIndex group : group_of) counts.in_hidden_groups += !group_seen[group];
+      if (sight[t] == TriangleSight::kVisible) {
+        ++counts.visible;
+        if (group_of[t] != kNone) group_seen[group_of[t]] = 1;
+      }
+    for (const GroupIndex group : group_of)
+      counts.in_hidden_groups += group != kNone && !group_seen[group];
     count(grouped, sight, group_seen, thesis, eye, counts.thesis);
     count(grouped, sight, group_seen, certified, eye, counts.certified);
   }

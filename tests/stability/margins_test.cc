@@ -243,6 +243,31 @@ Arena rough_patches(SplitMix64& random) {
   return arena;
 }
 
+/// A plateau with a few spikes, all of it one group, over low ground: from below, a spike is seen
+/// over whatever part of the rim lies before it, however far to the side.
+Arena plateau(SplitMix64& random) {
+  const std::int32_t side = 15;
+  const double half_columns = 1.5 + 3 * random.unit(), half_rows = 1.5 + 3 * random.unit();
+  const double drop_m = 50 + 200 * random.unit(), spike_share = 0.03 + 0.1 * random.unit();
+  const auto is_on_it = [&](double column, double row) {
+    return std::abs(column - 7) <= half_columns && std::abs(row - 7) <= half_rows;
+  };
+  Tin tin = triangulated(grid_of(side, side, kCellM,
+                                 [&](std::int32_t column, std::int32_t row) {
+                                   if (!is_on_it(column, row)) return -drop_m;
+                                   return random.unit() < spike_share ? 40 * random.unit()
+                                                                      : random.unit();
+                                 }),
+                         1 + random.below(3));
+  Arena arena = arena_of(std::move(tin), 1, [](double, double) { return kNone; });
+  for (std::size_t t = 0; t < arena.tin.triangles.size(); ++t) {
+    bool is_on_top = true;
+    for (const VertexIndex v : arena.tin.triangles[t]) is_on_top &= arena.tin.vertices[v].z_m >= 0;
+    if (is_on_top) arena.group_of_triangle[t] = 0;
+  }
+  return arena;
+}
+
 Arena posts(SplitMix64& random) {
   const std::int32_t side = whole(random, 10, 16);
   Tin tin = triangulated(
@@ -354,6 +379,10 @@ TEST(CertifiedMargins, LongAndShortBordersInAnUnevenMaze) {
 
 TEST(CertifiedMargins, RoughPatchesBetweenWalls) {
   EXPECT_GT(search_arenas(rough_patches, 10'000, 40, 100), 10'000U);
+}
+
+TEST(CertifiedMargins, PlateausWithSpikes) {
+  EXPECT_GT(search_arenas(plateau, 11'000, 30, 60), 10'000U);
 }
 
 TEST(CertifiedMargins, Posts) {

@@ -100,6 +100,31 @@ StabilityScene random_terrain(const char* name, const char* fails, const char* s
   return {name, fails, shows, triangulated(grid, 11), 8, {}};
 }
 
+/// How tiles of these scenes are made: exactly as the raster is.
+constexpr double kTileErrorM = 0.01;
+
+TiledOptions tiles_of(const StabilityScene& scene) {
+  TiledOptions options;
+  options.tile_samples = scene.tile_samples;
+  options.max_error_m = kTileErrorM;
+  options.group_triangles = scene.group_triangles;
+  return options;
+}
+
+StabilityScene in_tiles(const char* name, const char* fails, const char* shows,
+                        std::int32_t tile_samples, SampleGrid raster) {
+  StabilityScene scene{name, fails, shows, {}, 16, {}, tile_samples, std::move(raster)};
+  scene.tin = tiled_ground(scene.raster, tiles_of(scene)).whole;
+  return scene;
+}
+
+/// Walls on the borders of tiles of 8 cells and beside them, with gaps at their corners and amid.
+double walls_on_borders_m(std::int32_t column, std::int32_t row) {
+  const bool is_wall = column % 8 == 0 || row % 8 == 1;
+  const bool is_gap = (column + row) % 8 == 0 || (3 * column + row) % 11 == 0;
+  return is_wall && !is_gap ? 40 : (column * 37 + row * 61) % 13 * 0.3;
+}
+
 /// A raster on the Earth.
 struct EarthRaster {
   const char* crs;
@@ -165,6 +190,12 @@ std::vector<StabilityScene> scenes_on_earth() {
 
 }  // namespace
 
+TiledScene tiled(const StabilityScene& scene, const HidingOptions& hiding) {
+  TiledOptions options = tiles_of(scene);
+  options.hiding = hiding;
+  return tiled_scene(scene.raster, options);
+}
+
 std::vector<StabilityScene> stability_scenes() {
   std::vector<StabilityScene> scenes;
   for (DrawnScene& drawn : drawn_scenes())
@@ -189,6 +220,18 @@ std::vector<StabilityScene> stability_scenes() {
                                     return kind < 0.1 ? 300 * unit() : kind < 0.15 ? -200 : unit();
                                   })));
   for (StabilityScene& scene : scenes_on_earth()) scenes.push_back(std::move(scene));
+  scenes.push_back(in_tiles(
+      "tile_borders", "tile borders",
+      "Walls along the borders of tiles of 8 cells and beside them, open at some corners of tiles: "
+      "each tile is certified by itself, against coarse ones from two tiles away on.",
+      8, grid_of(33, 33, 10, walls_on_borders_m)));
+  for (const std::int32_t tile_samples : {4, 16})
+    scenes.push_back(in_tiles(tile_samples == 4 ? "tiles_of_4" : "tiles_of_16", "tile sizes",
+                              tile_samples == 4
+                                  ? "Random hills in tiles of 4 cells, which see most of the rest "
+                                    "by coarse tiles only."
+                                  : "The same in tiles of 16 cells.",
+                              tile_samples, random_hills(33, 33, 10, 24, 100, 0.01)));
   return scenes;
 }
 

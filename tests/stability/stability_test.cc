@@ -81,7 +81,7 @@ TEST(Stability, EveryLineOfTheCatalogueHasAScene) {
     lines.insert(scene.fails);
     EXPECT_EQ(check_tin(scene.tin), std::nullopt) << scene.name;
   }
-  // Tile borders and sizes have none: a scene is one tile. Thread counts are tested below.
+  // Thread counts are tested below.
   for (const char* line :
        {"thin sectors that no vertex falls into, while an edge crosses them",
         "wide sectors with a gap",
@@ -111,7 +111,9 @@ TEST(Stability, EveryLineOfTheCatalogueHasAScene) {
         "a far ridge behind a near hill",
         "grazing sight lines",
         "a patch that contains the camera",
-        "refraction 0 and 1"})
+        "refraction 0 and 1",
+        "tile borders",
+        "tile sizes"})
     EXPECT_TRUE(lines.contains(line)) << line;
 }
 
@@ -141,7 +143,7 @@ TEST(Stability, ComparisonSeesWhereTheThesisIsWrong) {
 }
 
 TEST(Stability, SameBitsForAnyNumberOfThreads) {
-  for (const char* name : {"random_voids", "near_pole"}) {
+  for (const char* name : {"random_voids", "near_pole", "tile_borders"}) {
     SCOPED_TRACE(name);
     const auto answer = [&](int threads) {
       set_thread_count(threads);

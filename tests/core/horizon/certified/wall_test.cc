@@ -33,7 +33,7 @@ bool is_blocked(const Tin& tin, const FanView& view, const FanPlace& p, const Fa
   return false;
 }
 
-/// Rays from between four targets, over a piece of the line u = 0.
+/// Rays from between four targets, over a piece that lies across the fan or aslant.
 struct Scene {
   Tin tin;
   FanView view;
@@ -52,13 +52,20 @@ struct Scene {
     view_along(
         fan_of(fans, static_cast<std::int32_t>(random.below(static_cast<std::uint64_t>(fans)))),
         tin, 40, 110 * random.unit(), view);
-    low = {0, 10 * random.unit() - 10, 0}, high = {0, 10 * random.unit(), 0};
     const double way_m = 5 + 20 * random.unit(), tan_half = view.fan.tan_half;
+    low = {0, 10 * random.unit() - 10, 0}, high = {0, 10 * random.unit(), 0};
+    // As far aslant as all rays still cross it one way.
+    if (random.below(2) == 0)
+      high.u_m = (1.98 * random.unit() - 0.99) * std::min(30.0, (high.v_m - low.v_m) / tan_half);
     targets = {low,
                high,
-               {-way_m, low.v_m - way_m * tan_half, 30 * random.unit()},
-               {-way_m, high.v_m + way_m * tan_half, 30 * random.unit()}};
-    beam = {{-low.v_m, tan_half, 1}, {high.v_m, tan_half, -1}, {0, 1, 0}};
+               {low.u_m - way_m, low.v_m - way_m * tan_half, 30 * random.unit()},
+               {high.u_m - way_m, high.v_m + way_m * tan_half, 30 * random.unit()}};
+    const double length_m = std::hypot(high.u_m - low.u_m, high.v_m - low.v_m);
+    const double nu = (high.v_m - low.v_m) / length_m, nv = -(high.u_m - low.u_m) / length_m;
+    beam = {{-low.v_m - low.u_m * tan_half, tan_half, 1},
+            {high.v_m - high.u_m * tan_half, tan_half, -1},
+            {-nu * low.u_m - nv * low.v_m, nu, nv}};
   }
 
   /// A place between the targets, and one on the piece that a ray from it can cross.
@@ -66,21 +73,26 @@ struct Scene {
     const FanPlace far = between(targets[2], targets[3], random.unit());
     const FanPlace near = between(low, high, random.unit());
     const FanPlace from = between(far, near, 0.99 * random.unit());
-    FanPlace over = between(low, high, random.unit());
     // The ends of the piece and of the fan are where something may be missed.
-    const double spread_m = (1 - 1e-9) * view.fan.tan_half * -from.u_m;
+    double share = random.unit();
+    const double turn = (1 - 1e-9) * view.fan.tan_half * (random.below(2) ? 1 : -1);
     switch (random.below(4)) {
       case 0:
-        over = random.below(2) ? low : high;
+        share = random.below(2) ? 0 : 1;
         break;
-      case 1:
-        over.v_m =
-            std::clamp(from.v_m + (random.below(2) ? spread_m : -spread_m), low.v_m, high.v_m);
+      case 1: {
+        const double at_low = low.v_m - from.v_m - turn * (low.u_m - from.u_m);
+        const double at_high = high.v_m - from.v_m - turn * (high.u_m - from.u_m);
+        share = std::clamp(at_low / (at_low - at_high), 0.0, 1.0);
         break;
+      }
       default:
         break;
     }
-    if (std::abs(over.v_m - from.v_m) > view.fan.tan_half * (over.u_m - from.u_m)) return {};
+    const FanPlace over = between(low, high, share);
+    if (!(over.u_m > from.u_m) ||
+        std::abs(over.v_m - from.v_m) > view.fan.tan_half * (over.u_m - from.u_m))
+      return {};
     return std::array{from, over};
   }
 };

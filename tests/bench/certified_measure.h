@@ -1,0 +1,89 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/build/certified_settings.h"
+#include "core/occlusion/certified/certified_regions.h"
+#include "core/occlusion/certified/hiding_bounds.h"
+#include "core/occlusion/groups.h"
+#include "core/occlusion/hidden_together.h"
+#include "core/terrain/tin.h"
+#include "tests/support/eyes_over_ground.h"
+
+namespace scarp::test {
+
+/// Figures count for a DEM where at least this share of its triangles is in truly hidden groups.
+inline constexpr double kLeastInHiddenGroups = 0.005;
+
+/// How groups are made, certified and judged.
+struct CertifiedQuestion {
+  std::uint32_t group_triangles = HiddenTogetherOptions{}.group_triangles;
+  double compactness = HiddenTogetherOptions{}.compactness;
+  double bytes = kCertifiedBytes;   ///< a triangle
+  std::optional<int> sectors = {};  ///< instead of bytes
+  CertifiedSettings certified = {};
+  int eyes = 30;  ///< at each height
+  /// So many groups drawn at random are certified and judged, all where there are no more: a fair
+  /// sample, because groups do not depend on each other.
+  std::uint32_t groups = UINT32_MAX;
+};
+
+/// Triangles over all eyes of a height; of a sample those in its groups, and as great a share of
+/// those in none.
+struct SeenCounts {
+  double triangles = 0, hidden = 0, in_hidden = 0, culled = 0, falsely = 0;
+  double bound = 0;  ///< under the bounds of whole cells, before they are coded
+};
+
+/// A way to divide a mesh into groups, and what came of it.
+struct Partition {
+  std::string name;
+  LeafGroups groups;  ///< those drawn; all other triangles have none
+  std::uint32_t all_groups = 0, median_group = 0;
+  double orphans = 0;  ///< share of all triangles
+  double grow_user_s = 0;
+  std::vector<std::uint8_t> is_counted;  ///< [triangles] in groups drawn, or orphans drawn
+  HidingBounds bounds;
+  CertifiedRegions regions;
+  double certify_user_s = 0, certify_wall_s = 0;  ///< of all groups; predicted from a sample
+  double bytes_per_triangle = 0;                  ///< of all groups
+  std::array<SeenCounts, kEyeHeightsM.size()> counts{};
+};
+
+/// Groups that are hidden together, as by the product.
+Partition crystals_of(const Tin& tin, const CertifiedQuestion& question);
+
+/// Squares of a quadtree of the same mean size.
+Partition squares_like(const Tin& tin, const Partition& crystals,
+                       const CertifiedQuestion& question);
+
+/// Certifies what was drawn, with sectors for all groups. Ends the program where regions are
+/// broken. The cost of all is predicted from that of the sample and of four groups: what a mesh
+/// costs once, and what each group does.
+void certify(const Tin& tin, const CertifiedQuestion& question, Partition& part);
+
+/// What the exact judge sees of some partitions from seeded eyes, the same for all of them.
+struct JudgedEye {
+  std::size_t height;  ///< index into kEyeHeightsM
+  Position eye;
+  std::vector<std::uint8_t> is_visible;  ///< [triangles]; 0 where none of the partitions counts it
+};
+std::vector<JudgedEye> judge_eyes(const Tin& tin, const std::vector<const Partition*>& parts,
+                                  int eyes);
+
+/// Counts anew what a certified partition culls from the eyes.
+void count_eyes(const std::vector<JudgedEye>& eyes, Partition& part);
+
+/// A partition's figures in words.
+nlohmann::json row_of(const Tin& tin, const Partition& part);
+
+/// User time of all threads until now.
+double user_seconds();
+double wall_seconds();
+
+}  // namespace scarp::test
