@@ -50,7 +50,7 @@ std::string axes(const Panel& panel, double least_share) {
     svg += svg_text(panel.left_px - 6, y + 4, "end", kSoftColour, kTextPx,
                     fmt::format("{:.1f}", share));
   }
-  for (const double mark : {1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 125.0, 250.0, 500.0, 1000.0}) {
+  for (const double mark : {1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 120.0, 250.0, 500.0, 1000.0}) {
     if (mark < panel.low || mark > panel.high) continue;
     svg += line(panel.x_px(mark), kBottomPx, panel.x_px(mark), kBottomPx + 5, kSoftColour);
     svg += svg_text(panel.x_px(mark), kBottomPx + 19, "middle", kSoftColour, kTextPx,
@@ -128,7 +128,7 @@ std::string front_picture(const nlohmann::json& points, const std::string& title
         fmt::format("<circle cx=\"{:.1f}\" cy=\"40\" r=\"4\" fill=\"{}\"/>\n", x + 5, kColours[h]);
     svg += svg_text(
         x + 14, 44, "start", kInkColour, kTextPx,
-        fmt::format("eye {:g} m above ground, {:.2f} wanted", kEyeHeightsM[h], kWantedShare[h]));
+        fmt::format("eye {:g} m up, {:.2f} wanted", kEyeHeightsM[h], kWantedShare[h]));
     x += 222;
   }
   for (const Panel& panel : panels)
