@@ -46,6 +46,14 @@ void group_tiles(const StabilityScene& scene, const HidingOptions& options, Grou
                           tile.regions.groups.end());
     regions.steps.insert(regions.steps.end(), tile.regions.steps.begin(), tile.regions.steps.end());
   }
+  leaves.collisions.resize(leaves.count);
+  for (std::size_t t = 0; t < leaves.group_of_triangle.size(); ++t)
+    for (const TriangleIndex n : grouped.tin.neighbours[t]) {
+      if (n == kNone || n < t) continue;
+      const GroupIndex own = leaves.group_of_triangle[t], other = leaves.group_of_triangle[n];
+      if (own != kNone && other != kNone && own != other)
+        count_collision(leaves.collisions, own, other);
+    }
   grouped.groups =
       build_group_tree(grouped.tin, stewart_horizons(grouped.tin.vertices, {}, {}), leaves);
   grouped.groups.certified = std::move(regions);
