@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <numbers>
 #include <numeric>
 
 #include "core/occlusion/certified/certify_groups.h"
@@ -19,8 +20,8 @@ namespace {
 
 constexpr std::uint64_t kGroupSeed = 11;
 
-/// Of which the cost of a mesh without its groups is measured.
-constexpr std::uint32_t kFewGroups = 4;
+/// Groups at most by which the cost of a mesh without its groups is measured.
+constexpr int kOutermost = 16;
 
 /// Orphans and sizes of all groups; then keeps some groups, drawn at random, and of orphans as
 /// great a share.
@@ -74,17 +75,40 @@ bool is_under(const HidingBounds& bounds, GroupIndex group, const Position& eye)
   return eye.z_m < bounds.height_m[group] + static_cast<double>(slope) * distance_m;
 }
 
+/// The outermost groups: ridges are looked for as far around them as around all.
+std::vector<GroupIndex> outermost(const HidingBounds& bounds) {
+  std::vector<GroupIndex> few;
+  for (int i = 0; i < kOutermost; ++i) {
+    const double azimuth_rad = 2 * std::numbers::pi * i / kOutermost;
+    const double x = std::cos(azimuth_rad), y = std::sin(azimuth_rad);
+    GroupIndex best = 0;
+    for (GroupIndex g = 1; g < bounds.circle.size(); ++g)
+      if (x * (bounds.circle[g].x_m - bounds.circle[best].x_m) +
+              y * (bounds.circle[g].y_m - bounds.circle[best].y_m) >
+          0)
+        best = g;
+    if (std::find(few.begin(), few.end(), best) == few.end()) few.push_back(best);
+  }
+  return few;
+}
+
 /// What all groups cost, from the cost of those drawn and of a few of them.
 double predicted_s(const Tin& tin, const HidingOptions& options, const Partition& part,
                    double drawn_s) {
-  if (part.groups.count <= 2 * kFewGroups) return drawn_s;
-  std::vector<GroupIndex> few = part.groups.group_of_triangle;
-  for (GroupIndex& g : few)
-    if (g >= kFewGroups) g = kNone;
+  const std::vector<GroupIndex> few = outermost(part.bounds);
+  const auto others = static_cast<double>(part.groups.count) - static_cast<double>(few.size());
+  if (others < 1) return drawn_s / part.groups.count * part.all_groups;
+  std::vector<GroupIndex> number(part.groups.count, kNone);
+  for (std::size_t i = 0; i < few.size(); ++i) number[few[i]] = static_cast<GroupIndex>(i);
+  std::vector<GroupIndex> group_of = part.groups.group_of_triangle;
+  for (GroupIndex& g : group_of)
+    if (g != kNone) g = number[g];
   const double begun_s = user_seconds();
-  bound_hiding(tin, few, kFewGroups, options);
+  const HidingBounds bounds =
+      bound_hiding(tin, group_of, static_cast<std::uint32_t>(few.size()), options);
+  compress_bounds(bounds, LeastGround(tin));
   const double few_s = user_seconds() - begun_s;
-  const double group_s = std::max(0.0, drawn_s - few_s) / (part.groups.count - kFewGroups);
+  const double group_s = std::max(0.0, drawn_s - few_s) / others;
   return drawn_s + group_s * (part.all_groups - part.groups.count);
 }
 

@@ -63,8 +63,8 @@ Partition squares_like(const Tin& tin, const Partition& crystals,
                        const CertifiedQuestion& question);
 
 /// Certifies what was drawn, with sectors for all groups. Ends the program where regions are
-/// broken. The cost of all is predicted from that of the sample and of four groups: what a mesh
-/// costs once, and what each group does.
+/// broken. The cost of all is predicted from that of the sample and of its outermost groups: what a
+/// mesh costs once, and what each group does.
 void certify(const Tin& tin, const CertifiedQuestion& question, Partition& part);
 
 /// What the exact judge sees of some partitions from seeded eyes, the same for all of them.
