@@ -12,10 +12,10 @@
 // triangles. Microseconds are user time of all threads, a triangle.
 // --built takes the meshes that users get, as `scarp build` makes them unless told otherwise, to a
 // tenth of a cell (of rasters of more than 1500 samples a side the middle). With --groups so many
-// groups drawn at random stand for all: a fair sample, because groups do not depend on each other.
-// scripts/bench built is --built --groups 100 --eyes 4.
-// At last the time that one camera takes with 10,000 groups: those of the last DEM, laid side by
-// side, and cameras that fly over them; memory that was asked for meanwhile is counted.
+// groups, drawn by their triangles, stand for all: a fair sample, because groups do not depend on
+// each other. scripts/bench built is --built --groups 100 --eyes 4. At last the time that one
+// camera takes with 10,000 groups: those of the last DEM, laid side by side, and cameras that fly
+// over them; memory that was asked for meanwhile is counted.
 // --markdown leaves out the DEMs' rows: what one setting comes to beside what is wanted of it.
 // --front tries several numbers of fans and of bytes, crystals only, and draws what they come to.
 // --scale measures how cost grows with the mesh, on one large DEM, and tells the bits of the

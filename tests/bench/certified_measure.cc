@@ -23,8 +23,7 @@ constexpr std::uint64_t kGroupSeed = 11;
 /// Groups at most by which the cost of a mesh without its groups is measured.
 constexpr int kOutermost = 16;
 
-/// Orphans and sizes of all groups; then keeps some groups, drawn at random, and of orphans as
-/// great a share.
+/// Orphans and sizes of all groups; then keeps the groups of some triangles, drawn at random.
 void draw(std::uint32_t count, Partition& part) {
   std::vector<GroupIndex>& group_of = part.groups.group_of_triangle;
   part.all_groups = part.groups.count;
@@ -36,28 +35,31 @@ void draw(std::uint32_t count, Partition& part) {
     else
       ++sizes[g];
   }
-  std::sort(sizes.begin(), sizes.end());
-  part.median_group = sizes[sizes.size() / 2];
   part.orphans = orphans / static_cast<double>(group_of.size());
-  part.is_counted.assign(group_of.size(), 1);
-  if (count >= part.groups.count) return;
-  SplitMix64 random(kGroupSeed);
-  std::vector<GroupIndex> order(part.groups.count), number(part.groups.count, kNone);
-  std::iota(order.begin(), order.end(), 0U);
-  for (GroupIndex g = 0; g < count; ++g) {
-    std::swap(order[g], order[g + random.below(part.groups.count - g)]);
-    number[order[g]] = g;
-  }
-  const double share = static_cast<double>(count) / part.groups.count;
-  for (std::size_t t = 0; t < group_of.size(); ++t) {
-    if (group_of[t] == kNone) {
-      part.is_counted[t] = random.unit() < share;
-    } else {
-      group_of[t] = number[group_of[t]];
-      part.is_counted[t] = group_of[t] != kNone;
+  part.weight.assign(group_of.size(), 1);
+  if (count < part.groups.count) {
+    part.weight.assign(group_of.size(), 0);
+    SplitMix64 random(kGroupSeed);
+    std::vector<float> draws(part.groups.count, 0);
+    std::vector<GroupIndex> number(part.groups.count, kNone);
+    part.groups.count = 0;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const std::size_t t = random.below(group_of.size());
+      const GroupIndex g = group_of[t];
+      if (g == kNone)
+        ++part.weight[t];
+      else if (++draws[g], number[g] == kNone)
+        number[g] = part.groups.count++;
+    }
+    for (std::size_t t = 0; t < group_of.size(); ++t) {
+      GroupIndex& g = group_of[t];
+      if (g == kNone) continue;
+      part.weight[t] = draws[g] / static_cast<float>(sizes[g]);
+      g = number[g];
     }
   }
-  part.groups.count = count;
+  std::sort(sizes.begin(), sizes.end());
+  part.median_group = sizes[sizes.size() / 2];
 }
 
 /// Whether bounds hide a group, before they are coded.
@@ -97,7 +99,13 @@ double predicted_s(const Tin& tin, const HidingOptions& options, const Partition
                    double drawn_s) {
   const std::vector<GroupIndex> few = outermost(part.bounds);
   const auto others = static_cast<double>(part.groups.count) - static_cast<double>(few.size());
-  if (others < 1) return drawn_s / part.groups.count * part.all_groups;
+  const auto triangles = [](const std::vector<GroupIndex>& groups) {
+    return static_cast<double>(groups.size()) -
+           static_cast<double>(std::count(groups.begin(), groups.end(), kNone));
+  };
+  const double drawn = triangles(part.groups.group_of_triangle);
+  const double all = static_cast<double>(tin.triangles.size()) * (1 - part.orphans);
+  if (others < 1) return drawn_s / drawn * all;
   std::vector<GroupIndex> number(part.groups.count, kNone);
   for (std::size_t i = 0; i < few.size(); ++i) number[few[i]] = static_cast<GroupIndex>(i);
   std::vector<GroupIndex> group_of = part.groups.group_of_triangle;
@@ -108,8 +116,8 @@ double predicted_s(const Tin& tin, const HidingOptions& options, const Partition
       bound_hiding(tin, group_of, static_cast<std::uint32_t>(few.size()), options);
   compress_bounds(bounds, LeastGround(tin));
   const double few_s = user_seconds() - begun_s;
-  const double group_s = std::max(0.0, drawn_s - few_s) / others;
-  return drawn_s + group_s * (part.all_groups - part.groups.count);
+  const double triangle_s = std::max(0.0, drawn_s - few_s) / (drawn - triangles(group_of));
+  return drawn_s + triangle_s * (all - drawn);
 }
 
 }  // namespace
@@ -177,7 +185,7 @@ std::vector<JudgedEye> judge_eyes(const Tin& tin, const std::vector<const Partit
   std::vector<TriangleIndex> judged;
   for (TriangleIndex t = 0; t < tin.triangles.size(); ++t)
     if (std::any_of(parts.begin(), parts.end(),
-                    [&](const Partition* p) { return p->is_counted[t]; }))
+                    [&](const Partition* p) { return p->weight[t] > 0; }))
       judged.push_back(t);
   std::vector<JudgedEye> all;
   const TinIndex index(tin);
@@ -205,14 +213,15 @@ void count_eyes(const std::vector<JudgedEye>& eyes, Partition& part) {
     }
     SeenCounts& counts = part.counts[look.height];
     for (std::size_t t = 0; t < group_of.size(); ++t) {
-      if (!part.is_counted[t]) continue;
+      const auto weight = static_cast<double>(part.weight[t]);
+      if (!(weight > 0)) continue;
       const GroupIndex g = group_of[t];
       const bool is_culled = g != kNone && culled[g], is_bound = g != kNone && bound[g];
-      ++counts.triangles;
-      counts.hidden += !look.is_visible[t];
-      counts.in_hidden += g != kNone && !seen[g];
-      counts.culled += is_culled;
-      counts.bound += is_bound;
+      counts.triangles += weight;
+      counts.hidden += look.is_visible[t] ? 0 : weight;
+      counts.in_hidden += g != kNone && !seen[g] ? weight : 0;
+      counts.culled += is_culled ? weight : 0;
+      counts.bound += is_bound ? weight : 0;
       counts.falsely += (is_culled || is_bound) && look.is_visible[t];
     }
   }

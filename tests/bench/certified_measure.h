@@ -28,13 +28,13 @@ struct CertifiedQuestion {
   std::optional<int> sectors = {};  ///< instead of bytes
   CertifiedSettings certified = {};
   int eyes = 30;  ///< at each height
-  /// So many groups drawn at random are certified and judged, all where there are no more: a fair
-  /// sample, because groups do not depend on each other.
+  /// The groups of so many triangles drawn at random are certified and judged, all groups where
+  /// there are no more: a fair sample, because groups do not depend on each other. Partitions of
+  /// one mesh are drawn from at the same places, so that they can be compared.
   std::uint32_t groups = UINT32_MAX;
 };
 
-/// Triangles over all eyes of a height; of a sample those in its groups, and as great a share of
-/// those in none.
+/// Triangles over all eyes of a height. A triangle of a sample stands for as many as its weight.
 struct SeenCounts {
   double triangles = 0, hidden = 0, in_hidden = 0, culled = 0, falsely = 0;
   double bound = 0;  ///< under the bounds of whole cells, before they are coded
@@ -47,7 +47,8 @@ struct Partition {
   std::uint32_t all_groups = 0, median_group = 0;
   double orphans = 0;  ///< share of all triangles
   double grow_user_s = 0;
-  std::vector<std::uint8_t> is_counted;  ///< [triangles] in groups drawn, or orphans drawn
+  /// [triangles] 1 where all groups are drawn; of a sample each draw is shared out to its group.
+  std::vector<float> weight;
   HidingBounds bounds;
   CertifiedRegions regions;
   double certify_user_s = 0, certify_wall_s = 0;  ///< of all groups; predicted from a sample
