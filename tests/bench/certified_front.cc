@@ -126,9 +126,8 @@ std::string front_picture(const nlohmann::json& points, const std::string& title
   for (std::size_t h = 0; h < std::size(kWantedShare); ++h) {
     svg +=
         fmt::format("<circle cx=\"{:.1f}\" cy=\"40\" r=\"4\" fill=\"{}\"/>\n", x + 5, kColours[h]);
-    svg += svg_text(
-        x + 14, 44, "start", kInkColour, kTextPx,
-        fmt::format("eye {:g} m up, {:.2f} wanted", kEyeHeightsM[h], kWantedShare[h]));
+    svg += svg_text(x + 14, 44, "start", kInkColour, kTextPx,
+                    fmt::format("eye {:g} m up, {:.2f} wanted", kEyeHeightsM[h], kWantedShare[h]));
     x += 222;
   }
   for (const Panel& panel : panels)
