@@ -15,21 +15,25 @@ constexpr double kRounding = 0x1p-30;
 constexpr double kLeastEdge = 0x1p-12;
 
 /// An edge in (across, up), from left to right.
-struct Edge {
-  const AheadPoint& from;
-  const AheadPoint& to;
+class Edge {
+ public:
+  Edge(const AheadPoint& from, const AheadPoint& to)
+      : from_(from), to_(to), slope_((to.up - from.up) / (to.across - from.across)) {}
 
-  bool is_long() const { return to.across - from.across >= kLeastEdge; }
-  double up_at(double across) const {
-    const double share = (across - from.across) / (to.across - from.across);
-    return from.up + std::clamp(share, 0.0, 1.0) * (to.up - from.up);
-  }
+  bool is_long() const { return to_.across - from_.across >= kLeastEdge; }
+  /// Requires an edge that is long, and a place on it.
+  double up_at(double across) const { return from_.up + (across - from_.across) * slope_; }
   /// The highest of the edge between two places; -inf where it is not between them.
   double most_within(double low, double high) const {
-    if (to.across < low || from.across > high) return -HUGE_VAL;
-    if (!is_long()) return std::max(from.up, to.up);
-    return std::max(up_at(low), up_at(high));
+    if (to_.across < low || from_.across > high) return -HUGE_VAL;
+    if (!is_long()) return std::max(from_.up, to_.up);
+    return std::max(up_at(std::max(low, from_.across)), up_at(std::min(high, to_.across)));
   }
+
+ private:
+  const AheadPoint& from_;
+  const AheadPoint& to_;
+  double slope_;
 };
 
 /// Corners from left to right.
@@ -89,8 +93,9 @@ AheadPoint RisingHorizon::place(const Position& position) const {
   AheadPoint p;
   p.ahead_m = ahead_x_ * x_m + ahead_y_ * y_m;
   p.right_m = ahead_y_ * x_m - ahead_x_ * y_m;
-  p.across = p.right_m / p.ahead_m;
-  p.up = (position.z_m - eye_.z_m) / p.ahead_m;
+  const double each = 1 / p.ahead_m;
+  p.across = p.right_m * each;
+  p.up = (position.z_m - eye_.z_m) * each;
   return p;
 }
 
@@ -157,20 +162,29 @@ bool RisingHorizon::hides(const std::array<AheadPoint, 3>& triangle) const {
 }
 
 void RisingHorizon::add(const std::array<AheadPoint, 3>& triangle) {
+  // First what most triangles of fine ground are: narrower than a part of the view.
+  const double least =
+      std::min({triangle[0].across, triangle[1].across, triangle[2].across}) + kRounding;
+  const double most =
+      std::max({triangle[0].across, triangle[1].across, triangle[2].across}) - kRounding;
+  if (!(most - least >= width_ && most - least >= kLeastEdge)) return;
   if (!are_placed(triangle)) return;
-  const auto t = sorted(triangle);
   // Borders that it lies across: between two of them a straight line on it hides.
   const int first =
-      static_cast<int>(std::ceil(std::max(0.0, (t[0].across + kRounding - left_) / width_)));
-  const int last = static_cast<int>(
-      std::floor(std::min<double>(kBins, (t[2].across - kRounding - left_) / width_)));
-  if (last <= first || t[2].across - t[0].across < kLeastEdge) return;
+      static_cast<int>(std::ceil(std::clamp<double>((least - left_) / width_, 0, kBins)));
+  const int last = static_cast<int>(std::floor(std::min<double>(kBins, (most - left_) / width_)));
+  if (last <= first) return;
+  const double highest = std::max({triangle[0].up, triangle[1].up, triangle[2].up});
+  if (std::none_of(up_.begin() + first, up_.begin() + last,
+                   [&](double up) { return up < highest; }))
+    return;
+  const auto t = sorted(triangle);
   const double farthest_m = std::max({t[0].ahead_m, t[1].ahead_m, t[2].ahead_m}) * (1 + kRounding);
   const double margin = rounding_of(t);
   const Edge whole{t[0], t[2]}, one{t[0], t[1]}, other{t[1], t[2]};
   const auto top_at = [&](double across) {
-    const Edge& bent = across < t[1].across ? one : other;
     const double up = whole.up_at(across);
+    const Edge& bent = across < t[1].across ? one : other;
     return bent.is_long() ? std::max(up, bent.up_at(across)) : up;
   };
   double before = top_at(border(first));
