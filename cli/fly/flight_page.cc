@@ -23,8 +23,9 @@ struct Line {
 
 /// Lines by frame, from zero, with their names at their right ends.
 std::string line_chart(const std::string& title, const std::vector<Line>& lines) {
-  constexpr double kWidthPx = 960, kHeightPx = 300, kLeftPx = 80, kRightPx = 780, kTopPx = 40,
-                   kBottomPx = 260;
+  constexpr double kWidthPx = 960, kLeftPx = 80, kRightPx = 780, kTopPx = 40, kNamePx = 15;
+  // As high as the names need.
+  const double bottom_px = std::max(260.0, kTopPx + kNamePx * static_cast<double>(lines.size()));
   double most = 0;
   std::size_t frames = 1;
   for (const Line& line : lines) {
@@ -36,8 +37,8 @@ std::string line_chart(const std::string& title, const std::vector<Line>& lines)
     return kLeftPx + (kRightPx - kLeftPx) * static_cast<double>(frame) /
                          static_cast<double>(std::max<std::size_t>(1, frames - 1));
   };
-  const auto y_of = [&](double value) { return kBottomPx - (kBottomPx - kTopPx) * value / most; };
-  std::string svg = svg_begin(kWidthPx, kHeightPx);
+  const auto y_of = [&](double value) { return bottom_px - (bottom_px - kTopPx) * value / most; };
+  std::string svg = svg_begin(kWidthPx, bottom_px + 40);
   svg += svg_text(kLeftPx, 22, "start", kInkColour, 15, title);
   const double step = round_step(most, 5);
   for (double value = 0; value <= most; value += step) {
@@ -48,9 +49,9 @@ std::string line_chart(const std::string& title, const std::vector<Line>& lines)
   }
   const double frame_step = std::max(1.0, round_step(static_cast<double>(frames), 8));
   for (double frame = 0; frame < static_cast<double>(frames); frame += frame_step)
-    svg += svg_text(x_of(static_cast<std::size_t>(frame)), kBottomPx + 18, "middle", kInkColour, 12,
+    svg += svg_text(x_of(static_cast<std::size_t>(frame)), bottom_px + 18, "middle", kInkColour, 12,
                     fmt::format("{:g}", frame));
-  svg += svg_text((kLeftPx + kRightPx) / 2, kBottomPx + 36, "middle", kSoftColour, 12, "frame");
+  svg += svg_text((kLeftPx + kRightPx) / 2, bottom_px + 36, "middle", kSoftColour, 12, "frame");
   // Names keep a line's height between them.
   std::vector<std::pair<double, const Line*>> ends;
   for (const Line& line : lines) {
@@ -64,10 +65,10 @@ std::string line_chart(const std::string& title, const std::vector<Line>& lines)
   }
   std::sort(ends.begin(), ends.end());
   double floor_px = kTopPx;
-  for (auto& [y_px, line] : ends) floor_px = (y_px = std::max(y_px, floor_px)) + 15;
-  double ceiling_px = kBottomPx;
+  for (auto& [y_px, line] : ends) floor_px = (y_px = std::max(y_px, floor_px)) + kNamePx;
+  double ceiling_px = bottom_px;
   for (auto end = ends.rbegin(); end != ends.rend(); ++end)
-    ceiling_px = (end->first = std::min(end->first, ceiling_px)) - 15;
+    ceiling_px = (end->first = std::min(end->first, ceiling_px)) - kNamePx;
   for (const auto& [y_px, line] : ends)
     svg += svg_text(kRightPx + 8, y_px + 4, "start", line->colour, 12, line->name);
   return svg + "</svg>\n";
