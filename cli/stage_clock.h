@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -15,7 +16,8 @@ struct StageCost {
 };
 
 /// Times stages that follow each other. Peak memory is the kernel's high-water mark, set back at
-/// the start of each stage where the kernel allows it (otherwise it only rises).
+/// the start of each stage where the kernel allows it (otherwise it only rises). Several clocks may
+/// run at once, each on a thread of its own; what they say of memory is the process's.
 class StageClock {
  public:
   void begin(const std::string& name);
@@ -25,7 +27,11 @@ class StageClock {
  private:
   std::vector<StageCost> costs_;
   std::chrono::steady_clock::time_point begun_;
+  std::size_t first_mark_ = 0;
 };
+
+/// Peak resident memory of the process since it began, in stages and between them.
+std::uint64_t peak_memory_bytes();
 
 /// Physical memory of the machine, bytes.
 std::uint64_t machine_memory_bytes();

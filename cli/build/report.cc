@@ -203,7 +203,7 @@ json build_report(const StepRun& run, const std::optional<MapPoint>& observer) {
   }
   report["refinement"] = refinement_report(meshes, groups);
   report["stages"] = stages_report(run);
-  std::uint64_t peak_bytes = 0;
+  std::uint64_t peak_bytes = peak_memory_bytes();  // steps of other processes may have more
   for (const json& stage : report["stages"])
     peak_bytes = std::max(peak_bytes, stage["peak_memory_bytes"].get<std::uint64_t>());
   report["peak_memory_bytes"] = peak_bytes;

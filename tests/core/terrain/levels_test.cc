@@ -183,6 +183,9 @@ TEST(Occluder, LiesNowhereAboveTheFinestSurfaceNorOverVoid) {
       const Occluder lowered = lower_under(coarse.tin, coarse.sample_of_vertex, finer);
       EXPECT_EQ(check_tin(lowered.tin), std::nullopt);
       EXPECT_EQ(lowered.tin.triangles.size(), coarse.tin.triangles.size());
+      const SurfaceGap gap = measure_gap(coarse.tin, finer);
+      EXPECT_EQ(lowered.gap.above_m, gap.above_m);
+      EXPECT_EQ(lowered.gap.below_m, gap.below_m);
       const Sampled sampled = sample_gap(lowered.tin, finest, seed);
       EXPECT_LE(sampled.above_m, 0);
       EXPECT_EQ(sampled.over_void, 0);
@@ -212,6 +215,55 @@ TEST(Occluder, LeavesOutWhatIsNotWhollyOverGround) {
   EXPECT_EQ(lower_under(coarse.tin, coarse.sample_of_vertex, test::triangulated(half))
                 .tin.triangles.size(),
             4U);
+}
+
+/// A coarse tile is lowered under the four beneath it and the edges of those beside them.
+TEST(Occluder, OfTilesBesideWhatReachesIntoTheHaloIsEnough) {
+  const SampleGrid grid = hills(3);
+  const TileScheme scheme(grid.columns, grid.rows, 8);
+  const std::int32_t finest = scheme.finest_level(), columns = grid.columns;
+  std::map<TileId, Occluder> fine;
+  const auto surface_of = [&](const TileId& id, std::int32_t stride) {
+    const TileWindow window = scheme.window(id);
+    const auto first = [&](std::int32_t sample) { return sample / stride; };
+    SampleGrid part = coarsened(grid, stride);
+    for (std::int32_t r = 0; r < part.rows; ++r)
+      for (std::int32_t c = 0; c < part.columns; ++c)
+        if (c < first(window.first_column) || c > first(window.last_column()) ||
+            r < first(window.first_row) || r > first(window.last_row()))
+          part.known[part.index(c, r)] = 0;
+    Occluder surface = triangles_of(part);
+    for (std::int64_t& sample : surface.sample_of_vertex)
+      sample = sample / part.columns * stride * columns + sample % part.columns * stride;
+    return surface;
+  };
+  for (const TileId& id : scheme.tiles(finest)) fine[id] = surface_of(id, 1);
+  int trimmed = 0;
+  for (const TileId& id : scheme.tiles(finest - 1)) {
+    const Occluder coarse = surface_of(id, 2);
+    if (coarse.tin.triangles.empty()) continue;
+    std::map<TileId, Occluder> near;
+    std::vector<SeenTile> all, enough;
+    for (const TileId& finer : scheme.finer_around(id)) {
+      const Occluder& whole = fine.at(finer);
+      if (whole.tin.triangles.empty()) continue;
+      all.push_back({finer, &whole.tin, whole.sample_of_vertex});
+      near[finer] = reaching_into(all.back(), columns, scheme.window_with_halo(id));
+      const Occluder& part = near.at(finer);
+      EXPECT_EQ(check_tin(part.tin), std::nullopt);
+      trimmed += part.tin.triangles.size() < whole.tin.triangles.size();
+      enough.push_back({finer, &part.tin, part.sample_of_vertex});
+    }
+    const SeenTile tile{id, &coarse.tin, coarse.sample_of_vertex};
+    const Occluder by_all = occluder_of(scheme, tile, all);
+    const Occluder by_near = occluder_of(scheme, tile, enough);
+    EXPECT_EQ(by_near.sample_of_vertex, by_all.sample_of_vertex);
+    EXPECT_EQ(by_near.tin.triangles, by_all.tin.triangles);
+    EXPECT_TRUE(by_near.tin.vertices == by_all.tin.vertices);
+    EXPECT_EQ(by_near.gap.above_m, by_all.gap.above_m);
+    EXPECT_EQ(by_near.gap.below_m, by_all.gap.below_m);
+  }
+  EXPECT_GT(trimmed, 4);
 }
 
 TEST(Occluder, OutsideKeepsWhatReachesOverTheRectangle) {
