@@ -61,7 +61,7 @@ struct ScenePyramid {
 TileHorizon empty_horizon(const TileContents& bounds) {
   const double x = (bounds.low[0] + bounds.high[0]) / 2, y = (bounds.low[1] + bounds.high[1]) / 2;
   const double radius_m = std::hypot(bounds.high[0] - x, bounds.high[1] - y) * (1 + 1e-9) + 1e-3;
-  return horizon_of_nothing(x, y, bounds.high[2], radius_m);
+  return horizon_of_nothing(kTilesetHorizon, x, y, bounds.high[2], radius_m);
 }
 
 class TilesetExport {

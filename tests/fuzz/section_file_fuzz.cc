@@ -9,6 +9,7 @@
 #include "tiles/store/groups_file.h"
 #include "tiles/store/horizon_file.h"
 #include "tiles/store/tin_file.h"
+#include "tiles/store/tree_file.h"
 
 /// Tile files: any bytes are read or refused with Error{kCorrupt}.
 namespace scarp {
@@ -36,6 +37,9 @@ void read_as_every_kind(const std::vector<std::byte>& bytes, Verify verify) {
     (void)check_tin(mesh.tin);
   });
   read_or_refuse(bytes, verify, read_horizon);
+  read_or_refuse(bytes, verify, [](const SectionFile& file) {
+    (void)hidden_tiles(read_tree(file), {30, 70, 2});
+  });
   read_or_refuse(bytes, verify, [](const SectionFile& file) {
     const HiddenSets sets = read_sets(file);
     (void)groups_of(sets, static_cast<std::uint32_t>(sets.size() - 1));
@@ -68,6 +72,7 @@ std::vector<std::vector<std::uint8_t>> fuzz_seeds() {
        {tin_writer(tin, samples).to_bytes(), tin_writer(Tin{}).to_bytes(),
         compact_tin_writer(tin, {{0, 1, 2, 3, 4, 5, 6, 7, 8}}, 3).to_bytes(),
         horizon_writer(test::small_horizons(tin)).to_bytes(),
+        tree_writer(test::small_tree()).to_bytes(),
         sets_writer({{0, 0, 1, 1}, {0, 0, 2, 3, 5}, {4, 7, 5, 1, 2}}).to_bytes(),
         groups_writer(test::small_groups(tin)).to_bytes(),
         groups_writer(test::small_certified_groups(tin)).to_bytes(),

@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "core/horizon/sectors.h"
+#include "core/occlusion/certified/tile_tree.h"
 #include "core/occlusion/groups.h"
 #include "core/terrain/tin.h"
 #include "tiles/store/scene_description.h"
@@ -69,6 +70,18 @@ inline Groups small_certified_groups(const Tin& tin) {
     regions.steps.push_back({step(0, 0), step(i, 40 * i), step(i + 3, 7), step(i + 3, 1023)});
   }
   return groups;
+}
+
+/// Two tiles and the one above, of eight cells each.
+inline TileTree small_tree() {
+  std::vector<TileNode> tiles;
+  for (const std::int32_t column : {0, 1}) {
+    TileHorizon horizon = horizon_of_nothing({4, 2, 1}, 100.0 * column, -50, 20, 75);
+    for (std::size_t i = 0; i < horizon.slopes.size(); ++i)
+      horizon.slopes[i] = i == 3 ? TileHorizon::kNothingHidden : 0.125F * static_cast<float>(i) - 1;
+    tiles.push_back({{1, column, 0}, std::move(horizon)});
+  }
+  return tree_over(std::move(tiles));
 }
 
 inline SceneDescription small_description() {

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <set>
 
@@ -9,6 +10,7 @@
 #include "tiles/store/horizon_file.h"
 #include "tiles/store/scene.h"
 #include "tiles/store/tin_file.h"
+#include "tiles/store/tree_file.h"
 
 namespace scarp {
 namespace {
@@ -82,6 +84,7 @@ class SceneCheck {
     for (const StoredFile& file : tile.files) {
       if (file.kind == "horizon") attempt([&] { check_horizon(file, has_tin ? &tin : nullptr); });
       if (file.kind == "groups") attempt([&] { check_groups(file, has_tin ? &tin : nullptr); });
+      if (file.kind == "tree") attempt([&] { check_tree(file); });
     }
   }
 
@@ -119,6 +122,24 @@ class SceneCheck {
                            groups.group_of_triangle.size(), tin->triangles.size());
     else if (check_groups_)
       broken = check_groups_(*tin, groups);
+    if (broken)
+      fault(fmt::format("'{}': {}; build the scene again", scene_.path_of(file), *broken));
+  }
+
+  /// Every tile that has groups is in the tree, with its ground in its circle.
+  void check_tree(const StoredFile& file) {
+    const TileTree tree = read_tree(checked(file));
+    std::optional<std::string> broken = check_tile_tree_bounds(tree);
+    for (const SceneTile& tile : scene_.description().tiles) {
+      if (broken || scene_.find(tile.id, "groups") == nullptr || !tile.contents) continue;
+      const auto node = std::ranges::find(tree.nodes, tile_id(tile), &TileNode::tile);
+      if (node == tree.nodes.end())
+        broken = fmt::format("tile {} is not in the tree", tile.id);
+      else if (std::hypot(tile.contents->high[0] - node->horizon.centre_x_m,
+                          tile.contents->high[1] - node->horizon.centre_y_m) >
+               node->horizon.radius_m)
+        broken = fmt::format("the circle of tile {} does not hold it", tile.id);
+    }
     if (broken)
       fault(fmt::format("'{}': {}; build the scene again", scene_.path_of(file), *broken));
   }

@@ -83,7 +83,7 @@ json horizon_class() {
   p["centre"] = std::move(centre);
   p["height"] = scalar("FLOAT64", "What slopes start from, metres in the frame");
   p["radius"] = scalar("FLOAT64", "Of a circle that holds the tile, metres in the frame");
-  p["slopes"] = array_of("FLOAT32", TileHorizon::kSectors * TileHorizon::kTileRings,
+  p["slopes"] = array_of("FLOAT32", kTilesetHorizon.cells(),
                          "Rings within sectors; -3e38 where nothing is known to be hidden");
   return horizon;
 }

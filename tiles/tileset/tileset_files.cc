@@ -156,9 +156,9 @@ class Subtree {
                                       });
     add_column<double>(table, "height", true, [](const Tile& t) { return t.horizon->height_m; });
     add_column<double>(table, "radius", true, [](const Tile& t) { return t.horizon->radius_m; });
-    add_column<std::array<float, TileHorizon::kSectors * TileHorizon::kTileRings>>(
+    add_column<std::array<float, kTilesetHorizon.cells()>>(
         table, "slopes", true, [](const Tile& t) {
-          std::array<float, TileHorizon::kSectors * TileHorizon::kTileRings> slopes;
+          std::array<float, kTilesetHorizon.cells()> slopes;
           std::copy(t.horizon->slopes.begin(), t.horizon->slopes.end(), slopes.begin());
           return slopes;
         });

@@ -19,7 +19,7 @@ struct Valley {
 };
 
 /// Rough ground within a ring of ridges of uneven height; the tile is what lies within the ring.
-Valley valley_in_ridges(std::uint64_t seed) {
+Valley valley_in_ridges(std::uint64_t seed, const HorizonLayout& layout = kTilesetHorizon) {
   constexpr int kSide = 44;
   constexpr double kCellM = 30, kRingM = 460, kTileM = 250;
   std::mt19937_64 random(seed);
@@ -51,7 +51,7 @@ Valley valley_in_ridges(std::uint64_t seed) {
     radius_m = std::max(radius_m, away_m + static_cast<double>(group.radius_m));
     highest_m = std::max(highest_m, group.height_m);
   }
-  valley.horizon = horizon_of_nothing(middle_m, middle_m, highest_m, radius_m);
+  valley.horizon = horizon_of_nothing(layout, middle_m, middle_m, highest_m, radius_m);
   cover_groups(valley.regions, valley.horizon);
   return valley;
 }
@@ -66,7 +66,7 @@ bool hides_all_groups(const CertifiedRegions& regions, const Position& eye) {
 TEST(TileHorizon, HidesNothingThatAGroupsRegionShows) {
   std::mt19937_64 random(5);
   for (const std::uint32_t seed : {1U, 2U}) {
-    const Valley valley = valley_in_ridges(seed);
+    const Valley valley = valley_in_ridges(seed, seed == 1 ? kTilesetHorizon : kTreeHorizon);
     const TileHorizon& horizon = valley.horizon;
     int hidden = 0;
     for (int i = 0; i < 4000; ++i) {
