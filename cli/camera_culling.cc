@@ -46,8 +46,20 @@ Camera camera_at(const GeoFrame& frame, const MapPoint& at, std::optional<double
 CullCounts cull_scene(SceneTiles& tiles, const Camera& camera, const std::string& method,
                       double distance_m) {
   CullCounts counts;
+  SceneTiles::HiddenFrom hidden;
+  // Only certified scenes have a tree.
+  if (method != "thesis") hidden = tiles.hidden_from(camera.eye);
+  counts.nodes_tested = hidden.nodes_tested;
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     if (!tiles.meets(i, {camera.eye, distance_m, camera.view})) continue;
+    if (!hidden.tiles.empty() && hidden.tiles[i]) {
+      const TileContents& contents = tiles.tile(i).contents.value();
+      counts.method = "certified";
+      counts.groups += contents.groups;
+      counts.triangles += contents.triangles;
+      ++counts.tiles_hidden;
+      continue;
+    }
     const Groups groups = tiles.read_groups(i);
     if (groups.leaf_count == 0 && tiles.size() > 1) continue;
     const auto culling = culling_method(tiles.scene(), groups, method);

@@ -36,6 +36,8 @@ int run_cull(const CullOptions& options) {
         {"camera", {{"x", at.x}, {"y", at.y}, {"height_m", at.height_m}}},
         {"tiles", tiles.size()},
         {"tiles_read", tiles.tiles_read()},
+        {"tiles_hidden", counts.tiles_hidden},
+        {"files_read", tiles.files_read()},
         {"groups", counts.groups},
         {"visible_groups", counts.visible_groups},
         {"nodes_tested", counts.nodes_tested},
@@ -53,7 +55,9 @@ int run_cull(const CullOptions& options) {
              counts.triangles,
              100.0 * static_cast<double>(counts.triangles - counts.drawn) /
                  static_cast<double>(std::max<std::uint64_t>(1, counts.triangles)));
-  if (tiles.size() > 1) fmt::print("; {} of {} tiles read", tiles.tiles_read(), tiles.size());
+  if (tiles.size() > 1)
+    fmt::print("; {} of {} tiles read, {} hidden as a whole", tiles.tiles_read(), tiles.size(),
+               counts.tiles_hidden);
   fmt::print("\n{}\n", fmt::join(counts.visible_groups, " "));
   return 0;
 }

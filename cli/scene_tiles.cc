@@ -6,6 +6,7 @@
 #include "core/terrain/weld.h"
 #include "tiles/store/groups_file.h"
 #include "tiles/store/tin_file.h"
+#include "tiles/store/tree_file.h"
 
 namespace scarp {
 namespace {
@@ -105,13 +106,27 @@ bool SceneTiles::meets(std::size_t i, const ViewPlan& plan) const {
   return !tile(i).contents || may_meet(*tile(i).contents, plan);
 }
 
+SceneTiles::HiddenFrom SceneTiles::hidden_from(const Position& eye) {
+  HiddenFrom hidden{std::vector<bool>(size(), false), 0};
+  const StoredFile* file = scene_.find(name_of(TileId{}), "tree");
+  if (file == nullptr) return hidden;
+  ++files_read_;
+  const HiddenTiles answer = hidden_tiles(read_tree(scene_.open(*file)), eye);
+  hidden.nodes_tested = answer.nodes_tested;
+  for (std::size_t i = 0; i < size(); ++i)
+    hidden.tiles[i] = std::ranges::binary_search(answer.tiles, tile_id(tile(i)));
+  return hidden;
+}
+
 Tin SceneTiles::read_tin(std::size_t i) {
   read_.insert(i);
+  ++files_read_;
   return scarp::read_tin(scene_.open(scene_.require(tile(i).id, "tin")));
 }
 
 Groups SceneTiles::read_groups(std::size_t i) {
   read_.insert(i);
+  ++files_read_;
   return scarp::read_groups(scene_.open(scene_.require(tile(i).id, "groups")));
 }
 

@@ -55,8 +55,18 @@ class SceneTiles {
   /// not tell how large tiles are.
   TileWindow window_of(const std::vector<std::size_t>& tiles) const;
 
+  /// Which tiles have no group that a camera could see, by the tree across tiles: no tile need be
+  /// read to know it. None in scenes without such a tree.
+  struct HiddenFrom {
+    std::vector<bool> tiles;  ///< [size()]
+    std::size_t nodes_tested = 0;
+  };
+  HiddenFrom hidden_from(const Position& eye);
+
   /// How many different ones were read so far.
   std::size_t tiles_read() const { return read_.size(); }
+  /// How many files of the scene were read so far, scene.json and the tree included.
+  std::size_t files_read() const { return files_read_; }
 
   /// As resolve of a whole scene, by the mesh of the tiles at the place.
   MapPoint resolve(const TypedPosition& typed, const std::string& crs);
@@ -67,6 +77,7 @@ class SceneTiles {
   std::vector<std::size_t> tiles_;  // into the description
   std::vector<GroupIndex> first_group_;
   std::set<std::size_t> read_;
+  std::size_t files_read_ = 1;
 };
 
 }  // namespace scarp

@@ -22,7 +22,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kPlanVersion = 1;
+constexpr int kPlanVersion = 2;
 
 /// Rough costs, in seconds of one core, and bytes; docs/scale.md has what is measured.
 constexpr double kReadS = 0.05e-6;      // a sample
@@ -141,6 +141,7 @@ class Planner {
     if (!plan_.has_one_tile()) {
       step.after.push_back(ranges_);
       step.outputs.push_back(group_raster_file_name(tile));
+      step.outputs.push_back(tree_node_file_name(tile));
     }
     add(std::move(step));
   }
@@ -149,7 +150,7 @@ class Planner {
     PlanStep step{StepKind::kFinish, {}, {}, {kSceneJson}, {0}, kBytesOfProcess, 1};
     for (const PlanStep& made : plan_.steps)
       for (const std::string& output : made.outputs)
-        if (!output.starts_with(kWorkFolder) || output.ends_with("group_raster"))
+        if (!output.starts_with(kWorkFolder) || made.kind == StepKind::kGroups)
           step.inputs.push_back(output);
     if (plan_.has_one_tile()) {
       step.memory_bytes = mesh_bytes(TileId{});
@@ -310,6 +311,9 @@ std::string occluder_file_name(const TileId& tile) {
 }
 std::string group_raster_file_name(const TileId& tile) {
   return work_file_name(tile, "group_raster");
+}
+std::string tree_node_file_name(const TileId& tile) {
+  return work_file_name(tile, "tree_node");
 }
 
 const char* option_for_one_tile(const BuildOptions& options) {

@@ -85,10 +85,12 @@ StoredPlan read_plan(const std::string& path);
 const char* option_for_one_tile(const BuildOptions& options);
 
 /// Files that steps hand on and that are no part of the finished scene: every other sample of a
-/// tile, for the next coarser level; what hides of a coarser tile; the groups of a tile's samples.
+/// tile, for the next coarser level; what hides of a coarser tile; the groups of a tile's samples;
+/// where cameras are hidden from all of a tile's groups.
 std::string samples_file_name(const TileId& tile);
 std::string occluder_file_name(const TileId& tile);
 std::string group_raster_file_name(const TileId& tile);
+std::string tree_node_file_name(const TileId& tile);
 
 /// The smallest tiles that there may be, cells along a side.
 inline constexpr std::int32_t kLeastTileSamples = 64;

@@ -12,6 +12,7 @@
 #include "cli/picture_size.h"
 #include "cli/scene_culling.h"
 #include "cli/verify.h"
+#include "core/occlusion/certified/tile_tree.h"
 #include "core/raster/preview.h"
 #include "core/terrain/weld.h"
 #include "ingest/dem/ground_placement.h"
@@ -19,6 +20,7 @@
 #include "tiles/store/groups_file.h"
 #include "tiles/store/tile_raster_file.h"
 #include "tiles/store/tin_file.h"
+#include "tiles/store/tree_file.h"
 
 namespace scarp {
 namespace {
@@ -44,6 +46,7 @@ class Finish {
       run_.check_sources();
     } else {
       tiles_.emplace(run_);
+      run_.part("tree", [&](const Progress&) { write_tree_over_tiles(); });
       run_.part("verify", [&](const Progress& p) { verify_blocks(p); });
       run_.part("layers", [&](const Progress& p) {
         join_groups_layer(p);
@@ -108,6 +111,18 @@ class Finish {
       if (progress) progress(static_cast<double>(block + 1) / kBlocks);
     }
   }
+
+  /// The group tree across tiles, from what each tile left of its groups.
+  void write_tree_over_tiles() {
+    std::vector<TileNode> nodes;
+    for (const FinestTiles::Tile& tile : tiles_->tiles())
+      if (const auto file = run_.open(tree_node_file_name(tile.id)))
+        for (TileNode& node : read_tree(*file).nodes) nodes.push_back(std::move(node));
+    const TileTree tree = tree_over(std::move(nodes));
+    tree_ = run_.make(tree_file_name(), "tree",
+                      [&](const std::string& path) { write_tree(path, tree, Existing::kReplace); });
+  }
+  static std::string tree_file_name() { return tile_file_name(name_of(TileId{}), "tree"); }
 
   RasterLayer groups_layer() const {
     RasterLayer layer = layer_over(source_.dem(), std::span<const std::int32_t>(), "group");
@@ -329,6 +344,11 @@ class Finish {
           tile.contents->groups = record.facts["groups"].get<std::uint64_t>();
       }
     }
+    if (tree_) {
+      SceneTile& root = tiles[TileId{}];
+      root.id = name_of(TileId{});
+      root.files.push_back(*tree_);
+    }
     std::vector<SceneTile> list;
     for (auto& [id, tile] : tiles) list.push_back(std::move(tile));
     return list;
@@ -356,6 +376,7 @@ class Finish {
   std::optional<MapPoint> observer_;
   std::vector<VerifyCounts> verified_;
   std::optional<FinestTiles> tiles_;  // of several
+  std::optional<StoredFile> tree_;
   std::size_t verified_tiles_ = 0;
   // Of a scene of one tile:
   Tin tin_;

@@ -9,11 +9,13 @@
 #include "core/error/error.h"
 #include "core/horizon/stewart.h"
 #include "core/occlusion/build_groups.h"
+#include "core/occlusion/certified/tile_tree.h"
 #include "core/occlusion/certified/tile_view.h"
 #include "tiles/store/groups_file.h"
 #include "tiles/store/horizon_file.h"
 #include "tiles/store/tile_raster_file.h"
 #include "tiles/store/tin_file.h"
+#include "tiles/store/tree_file.h"
 
 namespace scarp {
 namespace {
@@ -166,7 +168,14 @@ void groups_of_tile(StepRun& run) {
     groups = grow(plan.options, tin, horizon, progress, grouping);
     if (!plan.has_one_tile()) hand_on_groups(run, tin, groups);
   });
+  const Bounds bounds = bounds_of(tin.vertices);
   if (has_certified(plan.options.horizon)) certify(run, std::move(tin), groups);
+  if (!plan.has_one_tile())
+    run.part("tree", [&](const Progress&) {
+      const TileTree node{{tile_node(run.tile(), bounds, groups)}};
+      run.make(tree_node_file_name(run.tile()), "tree",
+               [&](const std::string& path) { write_tree(path, node, Existing::kReplace); });
+    });
   run.make(tile_file_name(name, "groups"), "groups",
            [&](const std::string& path) { write_groups(path, groups, Existing::kReplace); });
   const GroupFigures figures = figures_of(groups);

@@ -6,9 +6,14 @@
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <sstream>
 
+#include "cli/camera_culling.h"
 #include "cli/loaded_scene.h"
+#include "cli/scene_culling.h"
+#include "cli/sight_line.h"
+#include "cli/view_source.h"
 #include "tests/cli/tiled_terrain.h"
 
 namespace scarp {
@@ -163,7 +168,9 @@ TEST_F(TiledBuild, CullReadsTheTilesThatItNeeds) {
   const std::string ask = "$SCARP cull " + scene_ + " --camera=401900,5198200,40 --json";
   const json all = json::parse(run_scarp(ask).output);
   EXPECT_EQ(all["tiles"], 6);
-  EXPECT_EQ(all["tiles_read"], 6);
+  EXPECT_EQ(all["tiles_read"].get<int>() + all["tiles_hidden"].get<int>(), 6);
+  // scene.json, the tree, the mesh under the camera, and the groups of each tile.
+  EXPECT_EQ(all["files_read"].get<int>(), 3 + all["tiles_read"].get<int>());
   const json near = json::parse(run_scarp(ask + " --max-distance 500").output);
   EXPECT_LE(near["tiles_read"], 4);
   const json east = json::parse(run_scarp(ask + " --azimuth 90 --field-of-view 60").output);
@@ -174,6 +181,40 @@ TEST_F(TiledBuild, CullReadsTheTilesThatItNeeds) {
     EXPECT_LT((*part)["visible_groups"].size(), groups.size());
     for (const int group : (*part)["visible_groups"]) EXPECT_TRUE(groups.contains(group));
   }
+}
+
+TEST_F(TiledBuild, TilesThatTheTreeHidesChangeNoAnswer) {
+  const LoadedScene whole(scene_, {});
+  const auto culling = culling_method(whole, "certified");
+  ASSERT_NE(whole.scene.find("0/0/0", "tree"), nullptr);
+  std::mt19937_64 random(11);
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  const Bounds bounds = bounds_of(whole.tin.vertices);
+  std::uint64_t hidden = 0, read = 0;
+  constexpr int kCameras = 60;
+  for (int i = 0; i < kCameras; ++i) {
+    Camera camera{{uniform(bounds.low.x_m - 1000, bounds.high.x_m + 1000),
+                   uniform(bounds.low.y_m - 1000, bounds.high.y_m + 1000), 0},
+                  {}};
+    const double ground_m =
+        whole.index.ground_height_m(camera.eye.x_m, camera.eye.y_m).value_or(bounds.low.z_m);
+    camera.eye.z_m = ground_m + (i % 2 == 0 ? 2 : uniform(-400, 200));
+    SceneTiles tiles(scene_);
+    const CullCounts counts = cull_scene(tiles, camera, "", HUGE_VAL);
+    const CullingAnswer answer = culling->visible(camera);
+    ASSERT_EQ(counts.visible_groups, answer.visible_groups) << i;
+    EXPECT_EQ(counts.method, "certified");
+    EXPECT_EQ(counts.groups, whole.groups.leaf_count);
+    EXPECT_EQ(counts.triangles, whole.tin.triangles.size());
+    EXPECT_EQ(tiles.tiles_read() + counts.tiles_hidden, tiles.size());
+    EXPECT_EQ(tiles.files_read(), 2 + tiles.tiles_read());
+    hidden += counts.tiles_hidden;
+    read += tiles.tiles_read();
+  }
+  EXPECT_GT(hidden, 10U);
+  EXPECT_GT(read, 60U);
 }
 
 TEST_F(TiledBuild, ViewshedReadsTheTilesThatItReaches) {
