@@ -68,6 +68,28 @@ bool may_meet(const TileContents& contents, const ViewPlan& plan) {
   return !plan.view || !is_beside(contents, plan.eye, *plan.view);
 }
 
+bool may_meet_line(const TileContents& contents, const Position& from, const Position& to,
+                   double beside_m) {
+  const double beside = beside_m + kBesideM;
+  if (std::max(from.x_m, to.x_m) < contents.low[0] - beside ||
+      std::min(from.x_m, to.x_m) > contents.high[0] + beside ||
+      std::max(from.y_m, to.y_m) < contents.low[1] - beside ||
+      std::min(from.y_m, to.y_m) > contents.high[1] + beside)
+    return false;
+  // How far the rectangle's corners lie to the left of the line, times its length.
+  const double dx = to.x_m - from.x_m, dy = to.y_m - from.y_m;
+  double least = HUGE_VAL, most = -HUGE_VAL;
+  for (const double x : {contents.low[0], contents.high[0]}) {
+    for (const double y : {contents.low[1], contents.high[1]}) {
+      const double left = dx * (y - from.y_m) - dy * (x - from.x_m);
+      least = std::min(least, left);
+      most = std::max(most, left);
+    }
+  }
+  const double reach = beside * std::hypot(dx, dy);
+  return least <= reach && most >= -reach;
+}
+
 ViewPlan view_towards(const Position& eye, const TileContents& contents) {
   ViewPlan plan{eye, 0, {}};
   const double middle_x_m = (contents.low[0] + contents.high[0]) / 2;
@@ -137,6 +159,15 @@ std::vector<std::size_t> SceneTiles::tiles_in(const ViewPlan& plan) const {
   return tiles;
 }
 
+std::vector<std::size_t> SceneTiles::tiles_along(const Position& from, const Position& to,
+                                                 double beside_m) const {
+  std::vector<std::size_t> tiles;
+  for (std::size_t i = 0; i < size(); ++i)
+    if (!tile(i).contents || may_meet_line(*tile(i).contents, from, to, beside_m))
+      tiles.push_back(i);
+  return tiles;
+}
+
 Tin SceneTiles::read_ground(const std::vector<std::size_t>& tiles) {
   std::vector<Tin> tins;
   for (const std::size_t i : tiles) tins.push_back(read_tin(i));
@@ -144,6 +175,15 @@ Tin SceneTiles::read_ground(const std::vector<std::size_t>& tiles) {
   std::vector<const Tin*> parts;
   for (const Tin& tin : tins) parts.push_back(&tin);
   return weld(parts).tin;
+}
+
+Tin SceneTiles::read_within(const std::vector<std::size_t>& tiles, std::uint64_t memory_bytes,
+                            const std::string& remedy) {
+  std::uint64_t triangles = 0;
+  for (const std::size_t i : tiles)
+    if (tile(i).contents) triangles += tile(i).contents->triangles;
+  check_room(scene_.path(), triangles, kBytesPerGroundTriangle, memory_bytes, remedy);
+  return read_ground(tiles);
 }
 
 TileWindow SceneTiles::window_of(const std::vector<std::size_t>& tiles) const {

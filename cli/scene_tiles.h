@@ -20,6 +20,11 @@ struct ViewPlan {
 /// Whether a tile may have ground in a part of the plane. Side: never false where it has.
 bool may_meet(const TileContents& contents, const ViewPlan& plan);
 
+/// Whether a tile may have ground within a distance of a line in the plane. Side: never false where
+/// it has.
+bool may_meet_line(const TileContents& contents, const Position& from, const Position& to,
+                   double beside_m);
+
 /// The part of the plane that lines from an eye to a tile's ground lie in.
 ViewPlan view_towards(const Position& eye, const TileContents& contents);
 
@@ -49,8 +54,16 @@ class SceneTiles {
   Groups read_groups(std::size_t i);
   /// The tiles that meet a plan.
   std::vector<std::size_t> tiles_in(const ViewPlan& plan) const;
+  /// The tiles that may have ground within a distance of a line in the plane.
+  std::vector<std::size_t> tiles_along(const Position& from, const Position& to,
+                                       double beside_m) const;
   /// Tiles as one surface.
   Tin read_ground(const std::vector<std::size_t>& tiles);
+  /// The same, but Error{kResource}, before the work, where that takes more than is allowed.
+  /// @param memory_bytes  0: anything
+  /// @param remedy        for the message
+  Tin read_within(const std::vector<std::size_t>& tiles, std::uint64_t memory_bytes,
+                  const std::string& remedy);
   /// The rectangle of the raster that holds the samples of tiles; all of it where the scene does
   /// not tell how large tiles are.
   TileWindow window_of(const std::vector<std::size_t>& tiles) const;

@@ -50,7 +50,8 @@ class SightRun {
     ProgressBar bar(!options_.common.json);
     DemOptions dem = options_.dem;
     dem.memory_budget_bytes = options_.common.memory_budget_bytes;
-    surface_ = open_surface(options_.sources, dem, bar.stage("read"));
+    surface_ = open_surface(options_.sources, dem, bar.stage("read"),
+                            TypedLine{options_.from, options_.to, options_.crs});
   }
 
   void measure() {
@@ -96,6 +97,8 @@ class SightRun {
               {"distance_m", line_.distance_m},
               {"azimuth_deg", line_.azimuth_deg},
               {"sight", word_of(line_.sight)},
+              {"tiles", surface_->tiles()},
+              {"tiles_read", surface_->tiles_read()},
               {"first_blocker", nullptr},
               {"least_clearance", nullptr}};
     if (line_.blocker)

@@ -7,9 +7,11 @@
 
 #include "cli/ground_eye.h"
 #include "cli/loaded_scene.h"
+#include "cli/scene_tiles.h"
 #include "core/error/error.h"
 #include "core/sight/line_of_sight.h"
 #include "core/viewshed/grid_sight.h"
+#include "core/viewshed/sight_profile.h"
 
 namespace scarp {
 namespace {
@@ -68,8 +70,10 @@ class GridSurface : public SightSurface {
 class TinSurface : public SightSurface {
  public:
   /// @param owner  of the others
-  TinSurface(std::shared_ptr<const void> owner, const TinIndex& index, const GeoFrame& frame)
-      : owner_(std::move(owner)), index_(index), frame_(frame), placer_(frame) {}
+  /// @param tiles  that the surface is made of
+  TinSurface(std::shared_ptr<const void> owner, const TinIndex& index, const GeoFrame& frame,
+             const SceneTiles* tiles)
+      : owner_(std::move(owner)), index_(index), frame_(frame), placer_(frame), tiles_(tiles) {}
 
   const char* name() const override { return "tin"; }
   const GeoFrame& frame() const override { return frame_; }
@@ -99,29 +103,72 @@ class TinSurface : public SightSurface {
     return reach_m;
   }
 
+  std::size_t tiles() const override { return tiles_->size(); }
+  std::size_t tiles_read() const override { return tiles_->tiles_read(); }
+
  private:
   std::shared_ptr<const void> owner_;
   const TinIndex& index_;
   const GeoFrame& frame_;
   GeoFrame::Placer placer_;
+  const SceneTiles* tiles_;
+};
+
+/// Where an end is in the plane, and how far aside it comes when it is raised, by the lean of its
+/// normal.
+struct Foot {
+  Position place;
+  double lean_m;
+};
+
+Foot foot_of(const TypedPosition& typed, const std::string& crs, const GeoFrame& frame) {
+  const GeoFrame::Placer placer(frame);
+  MapPoint point = to_map_point(typed, crs, frame);
+  const double greatest_m = std::max(point.height_m, 0.0) + kGreatestFreeHeightM;
+  point.height_m = 0;
+  const Position place = placer.place(point);
+  point.height_m = greatest_m;
+  return {place, plan_distance_m(place, placer.place(point))};
+}
+
+/// The tiles that a line passes over, or that one passes over that has an end raised or lowered.
+std::vector<std::size_t> tiles_for(const SceneTiles& tiles, const std::optional<TypedLine>& line) {
+  if (!line) return tiles.tiles_in({});
+  const Foot from = foot_of(line->from, line->crs, tiles.frame());
+  const Foot to = foot_of(line->to, line->crs, tiles.frame());
+  return tiles.tiles_along(from.place, to.place, std::max(from.lean_m, to.lean_m));
+}
+
+/// Tiles of a scene as one surface.
+struct SceneAlong {
+  SceneAlong(const std::string& path, const std::optional<TypedLine>& line,
+             std::uint64_t memory_bytes)
+      : tiles(path),
+        tin(tiles.read_within(tiles_for(tiles, line), memory_bytes, "raise --memory")),
+        index(tin) {}
+
+  SceneTiles tiles;
+  Tin tin;
+  TinIndex index;
 };
 
 }  // namespace
 
 std::unique_ptr<SightSurface> open_surface(const std::vector<std::string>& sources,
-                                           const DemOptions& options, const Progress& progress) {
+                                           const DemOptions& options, const Progress& progress,
+                                           const std::optional<TypedLine>& line) {
   const std::string* scene = scene_among(sources, options);
   if (!scene)
     return std::make_unique<GridSurface>(
         std::make_shared<const Ground>(read_ground(sources, options, progress)));
-  const auto loaded =
-      std::make_shared<const LoadedScene>(*scene, ScenePart{options.memory_budget_bytes});
-  return std::make_unique<TinSurface>(loaded, loaded->index, loaded->frame);
+  const auto along = std::make_shared<const SceneAlong>(*scene, line, options.memory_budget_bytes);
+  return std::make_unique<TinSurface>(along, along->index, along->tiles.frame(), &along->tiles);
 }
 
 std::unique_ptr<SightSurface> surface_over(std::shared_ptr<const ViewSource> source) {
   if (source->tin_index() != nullptr)
-    return std::make_unique<TinSurface>(source, *source->tin_index(), *source->dem().frame);
+    return std::make_unique<TinSurface>(source, *source->tin_index(), *source->dem().frame,
+                                        source->scene_tiles());
   const Ground& ground = source->dem_ground();
   return std::make_unique<GridSurface>(std::shared_ptr<const Ground>(std::move(source), &ground));
 }

@@ -45,14 +45,27 @@ class SightSurface {
   /// Whether the line leaves a into the ground right away.
   virtual bool starts_under_ground(const Position& a, const Position& b) const = 0;
 
-  /// No ground lies farther from a place than this, in plan.
+  /// No ground that was read lies farther from a place than this, in plan.
   virtual double reach_m(const Position& from) const = 0;
+
+  /// Tiles of a scene, and how many of them were read; 0 where there are none.
+  virtual std::size_t tiles() const { return 0; }
+  virtual std::size_t tiles_read() const { return 0; }
 };
 
+/// The ends of the only line that is asked for, as they are typed.
+struct TypedLine {
+  TypedPosition from, to;
+  std::string crs;  ///< empty: the data's
+};
+
+/// @param line  of a scene only the tiles along it are read, and all answers about it are those of
+///              the whole scene; none: all of the scene
 /// Throws Error: what a scene or a DEM throws; kUsage where options for reading a DEM are given
 /// with a scene, or a scene is not alone.
 std::unique_ptr<SightSurface> open_surface(const std::vector<std::string>& sources,
-                                           const DemOptions& options, const Progress& progress);
+                                           const DemOptions& options, const Progress& progress,
+                                           const std::optional<TypedLine>& line = {});
 
 /// The surface of a source that is open already, for one thread at a time; it keeps the source.
 /// Requires a source without obstacles. Cost: a millisecond.

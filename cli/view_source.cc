@@ -62,16 +62,6 @@ std::vector<std::size_t> tiles_for(const SceneTiles& scene, const std::optional<
   return tiles_for(scene, {});
 }
 
-Tin read_within(SceneTiles& scene, const std::vector<std::size_t>& tiles,
-                std::uint64_t memory_bytes) {
-  std::uint64_t triangles = 0;
-  for (const std::size_t i : tiles)
-    if (scene.tile(i).contents) triangles += scene.tile(i).contents->triangles;
-  check_room(scene.scene().path(), triangles, kBytesPerGroundTriangle, memory_bytes,
-             "raise --memory, or give --max-distance");
-  return scene.read_ground(tiles);
-}
-
 }  // namespace
 
 ViewSource::ViewSource(const std::vector<std::string>& sources,
@@ -96,21 +86,26 @@ ViewSource::SceneGround::SceneGround(const std::string& path, const std::optiona
                                      std::uint64_t memory_bytes)
     : tiles(path),
       used(tiles_for(tiles, reach)),
-      tin(read_within(tiles, used, memory_bytes)),
+      tin(tiles.read_within(used, memory_bytes, "raise --memory, or give --max-distance")),
       index(tin) {}
 
 void ViewSource::stand_on_scene() {
   const SceneDescription& description = scene_->tiles.scene().description();
-  const TileWindow window = scene_->tiles.window_of(scene_->used);
   Dem& dem = ground_.dem;
-  dem.columns = window.columns;
-  dem.rows = window.rows;
+  dem.columns = description.raster.columns;
+  dem.rows = description.raster.rows;
   dem.geotransform = description.raster.geotransform;
-  dem.geotransform[0] += window.first_column * dem.geotransform[1];
-  dem.geotransform[3] += window.first_row * dem.geotransform[5];
   dem.frame = std::make_shared<const GeoFrame>(frame_of(description));
   dem.height_unit = std::string("m");
-  ground_.grid = GroundGrid(dem.columns, dem.rows, ground_placement(dem));
+  // Samples lie where they lie in the whole raster, to the last bit.
+  const TileWindow window = scene_->tiles.window_of(scene_->used);
+  PartPlacement part = ground_placement_of_part(dem, window.first_column, window.first_row,
+                                                window.columns, window.rows);
+  dem.columns = part.columns;
+  dem.rows = part.rows;
+  dem.geotransform[0] += part.first_column * dem.geotransform[1];
+  dem.geotransform[3] += part.first_row * dem.geotransform[5];
+  ground_.grid = GroundGrid(part.columns, part.rows, std::move(part.placement));
   stand_on(scene_->index, ground_.grid);
 }
 

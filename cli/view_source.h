@@ -28,7 +28,8 @@ class ViewSource {
   /// Throws Error: what a scene or a DEM throws; kUsage where options for reading a DEM are given
   /// with a scene, or a scene is not alone; kInput where obstacles do not share the DEM's cells.
   /// @param reach  of a scene of several tiles only those that the eyes reach are read, and the
-  ///               raster is the rectangle of these; none: all
+  ///               raster is the rectangle of these, to the left and above to whole blocks of
+  ///               GroundGrid's placement; none: all
   ViewSource(const std::vector<std::string>& sources, const std::vector<std::string>& obstacles,
              const DemOptions& options, const Progress& progress,
              const std::optional<ViewReach>& reach = {});

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <optional>
-
 #include "core/terrain/ground_grid.h"
 #include "ingest/dem/dem.h"
 
@@ -23,8 +21,10 @@ inline constexpr double kInterpolationErrorM = 0.5e-3;
 /// Cost: three PROJ calls a node, and one node for 4096 samples where blocks are largest.
 GroundGrid::Placement ground_placement(const Dem& dem);
 
-/// The interpolating one with a given block side, or nothing where its error is too large. For
-/// ground_placement and its tests. Requires an ellipsoidal frame, side a power of two.
-std::optional<BlockPlacement> interpolated_placement(const Dem& dem, std::int32_t side);
+/// part_of(ground_placement(dem), ...), bit for bit, at the cost of the part and of the error's
+/// measure (some thousand PROJ calls). Requires a rectangle within the raster.
+PartPlacement ground_placement_of_part(const Dem& dem, std::int32_t first_column,
+                                       std::int32_t first_row, std::int32_t columns,
+                                       std::int32_t rows);
 
 }  // namespace scarp
