@@ -153,6 +153,9 @@ void add_build(CLI::App& app, BuildOptions& o, std::function<int()>& run) {
         const int side = std::atoi(text.c_str());
         return (side & (side - 1)) == 0 ? "" : text + " is not a power of two";
       });
+  c->add_flag("--outlines", o.outlines,
+              "Write layers/groups.gpkg, the outlines of groups, in a scene of several tiles too, "
+              "where it may take more bytes than the meshes; a scene of one tile always has it");
   auto* resume = c->add_flag("--resume", o.resume,
                              "Go on where a build with the same options was stopped; what it "
                              "finished is not done again");

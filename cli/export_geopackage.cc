@@ -29,8 +29,9 @@ void export_geopackage(const ExportOptions&, SceneTiles& scene, const PartFolder
   };
   stages.run("groups", [&](const Progress& progress) {
     write_group_polygons_in_pieces(
-        folder.path_for("groups.gpkg"), [&](const TakeGroups& take) { give(take, progress); },
-        scene.scene().description().crs_wkt, Existing::kRefuse);
+        folder.path_for("groups.gpkg"), folder.path_for("growing.gpkg"),
+        [&](const TakeGroups& take) { give(take, progress); }, scene.scene().description().crs_wkt,
+        Existing::kRefuse);
   });
   result["groups"] = groups_written;
 }

@@ -82,6 +82,7 @@ struct BuildOptions {
   std::string crs;  ///< of the observer; empty: the data's
   /// Cells along a side of a tile of the finest level, a power of two.
   std::int32_t tile_samples = kDefaultTileSamples;
+  bool outlines = false;            ///< layers/groups.gpkg in scenes of several tiles too
   bool resume = false;              ///< go on where a build was stopped
   std::string plan_file;            ///< empty: none
   std::optional<std::size_t> step;  ///< of the plan: do this one only

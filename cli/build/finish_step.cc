@@ -50,6 +50,7 @@ class Finish {
       run_.part("verify", [&](const Progress& p) { verify_blocks(p); });
       run_.part("layers", [&](const Progress& p) {
         join_groups_layer(p);
+        if (plan_.options.outlines) join_polygons(p);
         if (plan_.options.observer) join_viewshed_layer(p);
       });
       run_.part("preview", [&](const Progress&) { draw(ground_for_picture(), {}); });
@@ -221,6 +222,31 @@ class Finish {
       write_group_polygons(path,
                            group_polygons(tin_, groups_, vertex_heights_m(tin_, frame_), frame_),
                            frame_.description().crs_wkt, Existing::kReplace);
+    });
+  }
+
+  /// The same from tile to tile, with the groups' numbers in the scene.
+  void join_polygons(const Progress& progress) {
+    const std::vector<FinestTiles::Tile>& tiles = tiles_->tiles();
+    const auto give = [&](const TakeGroups& take) {
+      std::int64_t first_group = 0;
+      for (std::size_t i = 0; i < tiles.size(); ++i) {
+        const Tin tin = tiles_->ground_of({i});
+        const Groups groups = tiles_->groups_of({i});
+        std::vector<GroupPolygon> polygons =
+            group_polygons(tin, groups, vertex_heights_m(tin, frame_), frame_);
+        for (GroupPolygon& polygon : polygons) {
+          polygon.group += first_group;
+          polygon.parent = -1;  // nodes above groups are numbered in each tile for itself
+        }
+        take(polygons);
+        first_group += groups.leaf_count;
+        if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(tiles.size()));
+      }
+    };
+    add_layer("layers/groups.gpkg", "gpkg", [&](const std::string& path) {
+      write_group_polygons_in_pieces(path, run_.writer().path_for("work/groups.gpkg"), give,
+                                     frame_.description().crs_wkt, Existing::kReplace);
     });
   }
 

@@ -85,6 +85,7 @@ void visit(Members& members, BuildOptions& options) {
   members.member("seed", options.seed);
   members.member("crs", options.crs);
   members.member("tile_samples", options.tile_samples);
+  members.member("outlines", options.outlines);
 }
 
 }  // namespace

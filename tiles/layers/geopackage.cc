@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <filesystem>
 #include <memory>
 
 #include "tiles/layers/gdal_session.h"
@@ -129,15 +130,12 @@ void outline_areas(GDALDataset& dataset, const RasterLayer& raster, const std::s
     session.fail(path);
 }
 
-/// Builds a GeoPackage in memory and puts it in its place. @param fill  (dataset, crs, session)
+/// Makes a GeoPackage where GDAL can write it. @param fill  (dataset, crs, session)
 template <typename Fill>
-void write_geopackage(const std::string& path, const std::string& crs_wkt, Existing existing,
-                      const Fill& fill) {
-  PartFile file(path, existing);
-  const GdalSession session;
+void build_geopackage(const std::string& built, const std::string& path, const std::string& crs_wkt,
+                      const GdalSession& session, const Fill& fill) {
   GDALDriver* driver = GetGDALDriverManager()->GetDriverByName("GPKG");
   if (driver == nullptr) session.fail(path);
-  const std::string built = session.folder() + "/built.gpkg";
   GDALDatasetUniquePtr dataset(driver->Create(built.c_str(), 0, 0, 0, GDT_Unknown, nullptr));
   if (!dataset) session.fail(path);
   if (crs_wkt.empty()) {
@@ -148,25 +146,90 @@ void write_geopackage(const std::string& path, const std::string& crs_wkt, Exist
   }
   dataset.reset();  // closing writes the rest
   session.check(path);
+}
+
+/// Builds a GeoPackage in memory and puts it in its place.
+template <typename Fill>
+void write_geopackage(const std::string& path, const std::string& crs_wkt, Existing existing,
+                      const Fill& fill) {
+  PartFile file(path, existing);
+  const GdalSession session;
+  const std::string built = session.folder() + "/built.gpkg";
+  build_geopackage(built, path, crs_wkt, session, fill);
   file.append(session.bytes_of(built, path));
   file.commit();
+}
+
+/// A file that is not there before and after, nor what SQLite may leave beside it.
+class BuiltFile {
+ public:
+  explicit BuiltFile(std::string path) : path_(std::move(path)) { remove(); }
+  ~BuiltFile() { remove(); }
+  BuiltFile(const BuiltFile&) = delete;
+  BuiltFile& operator=(const BuiltFile&) = delete;
+
+ private:
+  void remove() const {
+    std::error_code ignored;
+    for (const char* ending : {"", "-journal"}) std::filesystem::remove(path_ + ending, ignored);
+  }
+
+  std::string path_;
+};
+
+/// GDAL does not say what fails while it closes a file: whether all is there, the spatial index
+/// too.
+void check_whole(const std::string& built, std::uint64_t groups, const GdalSession& session,
+                 const std::string& path) {
+  const GDALDatasetUniquePtr dataset(GDALDataset::Open(built.c_str(), GDAL_OF_VECTOR));
+  if (!dataset) session.fail(path);
+  for (const char* count :
+       {"SELECT COUNT(*) FROM groups", "SELECT COUNT(*) FROM rtree_groups_geom"}) {
+    OGRLayer* answer = dataset->ExecuteSQL(count, nullptr, nullptr);
+    if (answer == nullptr) session.fail(path);
+    const OGRFeatureUniquePtr row(answer->GetNextFeature());
+    const bool is_whole = row && row->GetFieldAsInteger64(0) == static_cast<GIntBig>(groups);
+    dataset->ReleaseResultSet(answer);
+    if (!is_whole) session.fail(path);
+  }
 }
 
 }  // namespace
 
 void write_group_polygons(const std::string& path, std::span<const GroupPolygon> groups,
                           const std::string& crs_wkt, Existing existing) {
-  write_group_polygons_in_pieces(
-      path, [&](const TakeGroups& take) { take(groups); }, crs_wkt, existing);
-}
-
-void write_group_polygons_in_pieces(const std::string& path,
-                                    const std::function<void(const TakeGroups&)>& give,
-                                    const std::string& crs_wkt, Existing existing) {
   write_geopackage(path, crs_wkt, existing,
                    [&](GDALDataset& dataset, OGRSpatialReference* crs, const GdalSession& session) {
-                     fill_layer(dataset, give, crs, session, path);
+                     fill_layer(
+                         dataset, [&](const TakeGroups& take) { take(groups); }, crs, session,
+                         path);
                    });
+}
+
+void write_group_polygons_in_pieces(const std::string& path, const std::string& work_path,
+                                    const std::function<void(const TakeGroups&)>& give,
+                                    const std::string& crs_wkt, Existing existing) {
+  PartFile file(path, existing);
+  const GdalSession session;
+  const BuiltFile built(work_path);
+  std::uint64_t groups = 0;
+  build_geopackage(
+      work_path, path, crs_wkt, session,
+      [&](GDALDataset& dataset, OGRSpatialReference* crs, const GdalSession& of_dataset) {
+        const auto give_counted = [&](const TakeGroups& take) {
+          give([&](std::span<const GroupPolygon> piece) {
+            take(piece);
+            groups += piece.size();
+          });
+        };
+        fill_layer(dataset, give_counted, crs, of_dataset, path);
+      });
+  check_whole(work_path, groups, session, path);
+  std::error_code failure;
+  std::filesystem::rename(work_path, file.part_path(), failure);
+  if (failure) session.fail(path);
+  file.take_over();
+  file.commit();
 }
 
 void write_area_polygons(const std::string& path, const RasterLayer& layer,

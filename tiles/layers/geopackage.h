@@ -47,9 +47,13 @@ void write_group_polygons(const std::string& path, std::span<const GroupPolygon>
 /// Takes some of the groups.
 using TakeGroups = std::function<void(std::span<const GroupPolygon>)>;
 
-/// The same for groups that are never held all at once: `give` hands them over in pieces.
-/// Memory: the file, and a piece. Errors: as above, and what `give` throws.
-void write_group_polygons_in_pieces(const std::string& path,
+/// The same bytes for groups that are never held all at once: `give` hands them over in pieces.
+///
+/// @param work_path  where the file grows until it is whole, on the same file system as `path`, and
+///                   ends in ".gpkg"; there is none at the end
+/// Memory: a piece, and what SQLite keeps of a file, some megabytes. Errors: as above, and what
+/// `give` throws.
+void write_group_polygons_in_pieces(const std::string& path, const std::string& work_path,
                                     const std::function<void(const TakeGroups&)>& give,
                                     const std::string& crs_wkt, Existing existing);
 

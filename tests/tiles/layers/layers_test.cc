@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <limits>
 #include <set>
 
@@ -200,6 +201,39 @@ TEST(GeoPackage, RoundTrip) {
       EXPECT_TRUE(layer->GetSpatialRef()->IsSame(&crs));
     }
   }
+}
+
+TEST(GeoPackage, InPiecesTheSameBytes) {
+  const TemporaryFolder folder;
+  std::vector<GroupPolygon> many;
+  for (std::int64_t i = 0; i < 3000; ++i)
+    for (GroupPolygon group : two_groups()) {
+      group.group += 2 * i;
+      for (auto& polygon : group.polygons)
+        for (Ring& ring : polygon)
+          for (RingPoint& point : ring) point.x += 30.0 * static_cast<double>(i);
+      many.push_back(std::move(group));
+    }
+  for (const std::size_t count : {std::size_t{0}, std::size_t{2}, many.size()}) {
+    const std::span<const GroupPolygon> groups = std::span(many).first(count);
+    write_group_polygons(folder / "whole.gpkg", groups, wkt_of(32611), Existing::kReplace);
+    std::ofstream(folder / "growing.gpkg") << "left by a killed run";
+    const auto give = [&](const TakeGroups& take) {
+      for (std::size_t i = 0; i < count; i += 500)
+        take(groups.subspan(i, std::min<std::size_t>(500, count - i)));
+    };
+    write_group_polygons_in_pieces(folder / "pieces.gpkg", folder / "growing.gpkg", give,
+                                   wkt_of(32611), Existing::kReplace);
+    EXPECT_EQ(test::read_text(folder / "pieces.gpkg"), test::read_text(folder / "whole.gpkg"))
+        << count;
+    EXPECT_EQ(folder.names(), (std::set<std::string>{"pieces.gpkg", "whole.gpkg"}));
+  }
+  EXPECT_THROW(write_group_polygons_in_pieces(
+                   folder / "never.gpkg", folder / "growing.gpkg",
+                   [](const TakeGroups&) { throw Error(ErrorCode::kInput, "the source is gone"); },
+                   "", Existing::kRefuse),
+               Error);
+  EXPECT_EQ(folder.names(), (std::set<std::string>{"pieces.gpkg", "whole.gpkg"}));
 }
 
 TEST(GeoPackage, TheSameBytesTwice) {
