@@ -1,6 +1,8 @@
+#include <fmt/format.h>
 #include <gdal_priv.h>
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -29,19 +31,19 @@ json read_json(const std::string& path) {
   return json::parse(std::ifstream(path));
 }
 
-/// Values of a raster by the map place of its samples.
-std::map<std::pair<long, long>, int> values_by_place(const std::string& path) {
+/// Values of a raster, as a type of GDAL's, by the map place of its samples.
+template <class Value>
+std::map<std::pair<long, long>, Value> values_as(const std::string& path, GDALDataType type) {
   GDALDataset* raster = GDALDataset::Open(path.c_str());
   const int columns = raster->GetRasterXSize(), rows = raster->GetRasterYSize();
   double transform[6];
   raster->GetGeoTransform(transform);
-  std::vector<std::uint8_t> values(static_cast<std::size_t>(columns) *
-                                   static_cast<std::size_t>(rows));
+  std::vector<Value> values(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
   EXPECT_EQ(raster->GetRasterBand(1)->RasterIO(GF_Read, 0, 0, columns, rows, values.data(), columns,
-                                               rows, GDT_Byte, 0, 0),
+                                               rows, type, 0, 0),
             CE_None);
   GDALClose(raster);
-  std::map<std::pair<long, long>, int> by_place;
+  std::map<std::pair<long, long>, Value> by_place;
   for (int r = 0; r < rows; ++r)
     for (int c = 0; c < columns; ++c)
       by_place[{std::lround(transform[0] + (c + 0.5) * transform[1]),
@@ -49,6 +51,18 @@ std::map<std::pair<long, long>, int> values_by_place(const std::string& path) {
           values[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns) +
                  static_cast<std::size_t>(c)];
   return by_place;
+}
+
+std::map<std::pair<long, long>, int> values_by_place(const std::string& path) {
+  return values_as<int>(path, GDT_Int32);
+}
+
+/// Of a raster of floats, to the last bit; NaN has one.
+std::map<std::pair<long, long>, std::uint32_t> bits_by_place(const std::string& path) {
+  std::map<std::pair<long, long>, std::uint32_t> bits;
+  for (const auto& [place, value] : values_as<float>(path, GDT_Float32))
+    bits[place] = std::isnan(value) ? ~0U : std::bit_cast<std::uint32_t>(value);
+  return bits;
 }
 
 class TiledBuild : public test::TiledTerrain {};
@@ -243,6 +257,114 @@ TEST_F(TiledBuild, ViewshedReadsTheTilesThatItReaches) {
   EXPECT_GT(visible, 100);
 }
 
+TEST_F(TiledBuild, SamplesOfAPartLieWhereTheyLieInTheWhole) {
+  const TypedPosition eye = parse_position("403000,5197300,40");
+  const ViewSource whole({scene_}, {}, {}, {});
+  const ViewSource part({scene_}, {}, {}, {}, ViewReach{{eye}, "", 700});
+  ASSERT_LT(part.tiles_read(), whole.tiles_read());
+  const auto offset = [&](std::size_t i) {
+    return static_cast<std::int32_t>(
+        std::lround((part.dem().geotransform[i] - whole.dem().geotransform[i]) /
+                    whole.dem().geotransform[i == 0 ? 1 : 5]));
+  };
+  const std::int32_t left = offset(0), above = offset(3);
+  ASSERT_GT(left, 0);
+  const Position at = part.place(eye, "").position;
+  EXPECT_EQ(at, whole.place(eye, "").position);
+  int compared = 0;
+  for (std::int32_t row = 0; row < part.samples().rows(); ++row) {
+    for (std::int32_t column = 0; column < part.samples().columns(); ++column) {
+      const Position expected = whole.samples().at(left + column, above + row);
+      if (std::hypot(expected.x_m - at.x_m, expected.y_m - at.y_m) > 700) continue;
+      ASSERT_EQ(part.samples().at(column, row), expected) << column << " " << row;
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 500);
+}
+
+TEST_F(TiledBuild, ViewshedOfAPartIsTheCropOfTheWhole) {
+  const std::string eyes = folder_->path("eyes.csv");
+  std::ofstream(eyes) << "x,y,height\n403000,5197300,40\n";
+  for (const std::string mode : {"visible", "ground"}) {
+    const std::string part = folder_->path("part.tif"), whole = folder_->path("whole.tif");
+    const std::string ask =
+        "$SCARP viewshed " + scene_ + " --overwrite --max-distance 700 --json --mode " + mode;
+    const RunResult run = run_scarp(ask + " --observer=403000,5197300,40 -o " + part);
+    ASSERT_EQ(run.exit_code, 0) << run.errors;
+    EXPECT_LT(json::parse(run.output)["tiles_read"], 6);
+    // Eyes from a file take the whole raster.
+    const RunResult all = run_scarp(ask + " --observers " + eyes + " -o " + whole);
+    ASSERT_EQ(all.exit_code, 0) << all.errors;
+    EXPECT_EQ(json::parse(all.output)["tiles_read"], 6);
+    const auto expected = bits_by_place(whole);
+    std::set<std::uint32_t> values;
+    for (const auto& [place, bits] : bits_by_place(part)) {
+      ASSERT_EQ(bits, expected.at(place)) << mode << " " << place.first << " " << place.second;
+      values.insert(bits);
+    }
+    EXPECT_GT(values.size(), mode == "ground" ? 100U : 1U);
+  }
+}
+
+TEST_F(TiledBuild, SightReadsTheTilesAlongTheLineAndAnswersAsTheWholeScene) {
+  const auto whole = open_surface({scene_}, {}, {});
+  EXPECT_EQ(whole->tiles_read(), 6U);
+  const auto measured = [](const SightSurface& surface, const TypedLine& line) {
+    return measure_sight(surface, surface.place(line.from, line.crs),
+                         surface.place(line.to, line.crs), 1e9, line.from.text, line.to.text);
+  };
+  std::mt19937_64 random(7);
+  std::size_t read = 0, blocked = 0;
+  constexpr std::size_t kLines = 40;
+  for (std::size_t i = 0; i < kLines; ++i) {
+    const auto end = [&](double height_m) {
+      const auto part = [&] { return std::uniform_real_distribution<double>(0.02, 0.98)(random); };
+      return parse_position(fmt::format("{},{},{}asl", 400'000 + part() * 30 * test::kTiledColumns,
+                                        5'200'000 - part() * 30 * test::kTiledRows, height_m));
+    };
+    const TypedLine line{end(2000 + 60.0 * static_cast<double>(i)), end(2500), ""};
+    const auto along = open_surface({scene_}, {}, {}, line);
+    const SightLine one = measured(*along, line), all = measured(*whole, line);
+    EXPECT_EQ(one.sight, all.sight);
+    EXPECT_EQ(one.from.ground_m, all.from.ground_m);
+    EXPECT_EQ(one.least_from_m, all.least_from_m);
+    EXPECT_EQ(one.least_to_m, all.least_to_m);
+    EXPECT_EQ(one.void_at_end, all.void_at_end);
+    ASSERT_EQ(one.blocker.has_value(), all.blocker.has_value());
+    if (one.blocker) EXPECT_EQ(one.blocker->distance_m, all.blocker->distance_m);
+    ASSERT_EQ(one.profile.size(), all.profile.size());
+    for (std::size_t k = 0; k < one.profile.size(); ++k) {
+      EXPECT_EQ(one.profile[k].ground, all.profile[k].ground);
+      EXPECT_EQ(one.profile[k].clearance_m, all.profile[k].clearance_m);
+      EXPECT_EQ(one.profile[k].void_before, all.profile[k].void_before);
+    }
+    read += along->tiles_read();
+    blocked += one.blocker.has_value();
+  }
+  EXPECT_LT(read, 4 * kLines);
+  EXPECT_GT(blocked, 5U);
+  EXPECT_LT(blocked, kLines);
+  const RunResult run =
+      run_scarp("$SCARP sight " + scene_ + " --from=400100,5199900 --to=400500,5199900 --json");
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  EXPECT_EQ(json::parse(run.output)["tiles"], 6);
+  EXPECT_EQ(json::parse(run.output)["tiles_read"], 1);
+}
+
+TEST_F(TiledBuild, OutlinesAreThoseOfAnExport) {
+  const std::string scene = folder_->path("outlined.scene"), out = folder_->path("outlines");
+  const RunResult built = run_scarp(build(scene) + "--outlines");
+  ASSERT_EQ(built.exit_code, 0) << built.errors;
+  auto files = files_of(scene);
+  ASSERT_TRUE(files.contains("layers/groups.gpkg"));
+  ASSERT_EQ(run_scarp("$SCARP export " + scene_ + " --to gpkg -o " + out).exit_code, 0);
+  EXPECT_EQ(files["layers/groups.gpkg"], files_of(out)["groups.gpkg"]);
+  files.erase("layers/groups.gpkg");
+  EXPECT_EQ(files, files_of(scene_));
+  EXPECT_EQ(run_scarp("$SCARP check " + scene).exit_code, 0);
+}
+
 TEST_F(TiledBuild, StepsOfAPlanMakeTheSameSceneInAnyOrderThatItAllows) {
   const std::string plan = folder_->path("plan.json"), scene = folder_->path("planned.scene");
   ASSERT_EQ(run_scarp(build(scene) + "--plan " + plan).exit_code, 0);
@@ -328,6 +450,18 @@ TEST_F(TiledBuild, CheckFindsAFlippedBitInAnyFile) {
     write(byte);
   }
   EXPECT_EQ(run_scarp("$SCARP check " + scene_).exit_code, 0);
+}
+
+TEST_F(TiledBuild, WhatTakesOnePieceSaysSo) {
+  const RunResult run = run_scarp("$SCARP build " + dem_ + " -o " + folder_->path("one.scene") +
+                                  " --vertices 300 --fans 8 --tile-samples 64 --json");
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  const json report = json::parse(run.output);
+  EXPECT_EQ(report["tiles"]["finest"], 1);
+  ASSERT_EQ(report["warnings"].size(), 1U);
+  EXPECT_EQ(report["warnings"][0],
+            "--vertices takes all 141 x 118 samples in one piece; leave it out for tiles of "
+            "--tile-samples 64");
 }
 
 TEST_F(TiledBuild, MemoryThatIsTooSmallIsSaidBeforeTheWork) {
