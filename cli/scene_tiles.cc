@@ -186,23 +186,45 @@ Tin SceneTiles::read_within(const std::vector<std::size_t>& tiles, std::uint64_t
   return read_ground(tiles);
 }
 
-TileWindow SceneTiles::window_of(const std::vector<std::size_t>& tiles) const {
+std::optional<TileScheme> SceneTiles::tile_scheme() const {
   const RasterGeometry& raster = scene_.description().raster;
   const auto& parameters = scene_.description().parameters;
   const auto side = parameters.find("tile_samples");
-  if (side == parameters.end() || tiles.size() == size() || tiles.empty())
+  if (side == parameters.end()) return {};
+  return TileScheme(raster.columns, raster.rows,
+                    static_cast<std::int32_t>(std::get<std::int64_t>(side->second)));
+}
+
+TileWindow SceneTiles::window_of(const std::vector<std::size_t>& tiles) const {
+  const RasterGeometry& raster = scene_.description().raster;
+  const std::optional<TileScheme> scheme = tile_scheme();
+  if (!scheme || tiles.size() == size() || tiles.empty())
     return {0, 0, raster.columns, raster.rows, 1};
-  const TileScheme scheme(raster.columns, raster.rows,
-                          static_cast<std::int32_t>(std::get<std::int64_t>(side->second)));
   std::int32_t left = raster.columns, above = raster.rows, right = 0, below = 0;
   for (const std::size_t i : tiles) {
-    const TileWindow window = scheme.window(tile_id(tile(i)));
+    const TileWindow window = scheme->window(tile_id(tile(i)));
     left = std::min(left, window.first_column);
     above = std::min(above, window.first_row);
     right = std::max(right, window.last_column());
     below = std::max(below, window.last_row());
   }
   return {left, above, right - left + 1, below - above + 1, 1};
+}
+
+std::vector<std::size_t> SceneTiles::tiles_over(const TileWindow& rectangle) const {
+  const std::optional<TileScheme> scheme = tile_scheme();
+  std::vector<std::size_t> tiles;
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (scheme) {
+      const TileWindow window = scheme->window(tile_id(tile(i)));
+      if (window.first_column >= rectangle.last_column() ||
+          window.last_column() <= rectangle.first_column ||
+          window.first_row >= rectangle.last_row() || window.last_row() <= rectangle.first_row)
+        continue;
+    }
+    tiles.push_back(i);
+  }
+  return tiles;
 }
 
 MapPoint SceneTiles::resolve(const TypedPosition& typed, const std::string& crs) {

@@ -76,6 +76,10 @@ class SceneTiles {
   };
   HiddenFrom hidden_from(const Position& eye);
 
+  /// The tiles that have a cell of a rectangle of the raster; all where the scene does not tell how
+  /// large tiles are.
+  std::vector<std::size_t> tiles_over(const TileWindow& rectangle) const;
+
   /// How many different ones were read so far.
   std::size_t tiles_read() const { return read_.size(); }
   /// How many files of the scene were read so far, scene.json and the tree included.
@@ -85,6 +89,8 @@ class SceneTiles {
   MapPoint resolve(const TypedPosition& typed, const std::string& crs);
 
  private:
+  std::optional<TileScheme> tile_scheme() const;
+
   Scene scene_;
   GeoFrame frame_;
   std::vector<std::size_t> tiles_;  // into the description

@@ -62,6 +62,23 @@ std::vector<std::size_t> tiles_for(const SceneTiles& scene, const std::optional<
   return tiles_for(scene, {});
 }
 
+/// The raster that a scene was made from.
+Dem dem_of(const SceneDescription& description) {
+  Dem dem;
+  dem.columns = description.raster.columns;
+  dem.rows = description.raster.rows;
+  dem.geotransform = description.raster.geotransform;
+  dem.frame = std::make_shared<const GeoFrame>(frame_of(description));
+  dem.height_unit = std::string("m");
+  return dem;
+}
+
+/// Samples lie where they lie in the whole raster, to the last bit.
+PartPlacement place_part(const Dem& dem, const TileWindow& window) {
+  return ground_placement_of_part(dem, window.first_column, window.first_row, window.columns,
+                                  window.rows);
+}
+
 }  // namespace
 
 ViewSource::ViewSource(const std::vector<std::string>& sources,
@@ -85,27 +102,21 @@ ViewSource::ViewSource(const std::vector<std::string>& sources,
 ViewSource::SceneGround::SceneGround(const std::string& path, const std::optional<ViewReach>& reach,
                                      std::uint64_t memory_bytes)
     : tiles(path),
-      used(tiles_for(tiles, reach)),
+      dem(dem_of(tiles.scene().description())),
+      part(place_part(dem, tiles.window_of(tiles_for(tiles, reach)))),
+      used(tiles.tiles_over({part.first_column, part.first_row, part.columns, part.rows, 1})),
       tin(tiles.read_within(used, memory_bytes, "raise --memory, or give --max-distance")),
       index(tin) {}
 
 void ViewSource::stand_on_scene() {
-  const SceneDescription& description = scene_->tiles.scene().description();
+  const PartPlacement& part = scene_->part;
   Dem& dem = ground_.dem;
-  dem.columns = description.raster.columns;
-  dem.rows = description.raster.rows;
-  dem.geotransform = description.raster.geotransform;
-  dem.frame = std::make_shared<const GeoFrame>(frame_of(description));
-  dem.height_unit = std::string("m");
-  // Samples lie where they lie in the whole raster, to the last bit.
-  const TileWindow window = scene_->tiles.window_of(scene_->used);
-  PartPlacement part = ground_placement_of_part(dem, window.first_column, window.first_row,
-                                                window.columns, window.rows);
+  dem = scene_->dem;
   dem.columns = part.columns;
   dem.rows = part.rows;
   dem.geotransform[0] += part.first_column * dem.geotransform[1];
   dem.geotransform[3] += part.first_row * dem.geotransform[5];
-  ground_.grid = GroundGrid(part.columns, part.rows, std::move(part.placement));
+  ground_.grid = GroundGrid(part.columns, part.rows, part.placement);
   stand_on(scene_->index, ground_.grid);
 }
 

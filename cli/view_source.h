@@ -29,7 +29,8 @@ class ViewSource {
   /// with a scene, or a scene is not alone; kInput where obstacles do not share the DEM's cells.
   /// @param reach  of a scene of several tiles only those that the eyes reach are read, and the
   ///               raster is the rectangle of these, to the left and above to whole blocks of
-  ///               GroundGrid's placement; none: all
+  ///               GroundGrid's placement, with all tiles in it: what is seen and what is void are
+  ///               those of the whole raster; none: all
   ViewSource(const std::vector<std::string>& sources, const std::vector<std::string>& obstacles,
              const DemOptions& options, const Progress& progress,
              const std::optional<ViewReach>& reach = {});
@@ -79,6 +80,8 @@ class ViewSource {
                 std::uint64_t memory_bytes);
 
     SceneTiles tiles;
+    Dem dem;             ///< the scene's whole raster
+    PartPlacement part;  ///< of the raster's part that is looked at
     std::vector<std::size_t> used;
     Tin tin;
     TinIndex index;
