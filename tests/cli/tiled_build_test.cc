@@ -333,7 +333,9 @@ TEST_F(TiledBuild, SightReadsTheTilesAlongTheLineAndAnswersAsTheWholeScene) {
     EXPECT_EQ(one.least_to_m, all.least_to_m);
     EXPECT_EQ(one.void_at_end, all.void_at_end);
     ASSERT_EQ(one.blocker.has_value(), all.blocker.has_value());
-    if (one.blocker) EXPECT_EQ(one.blocker->distance_m, all.blocker->distance_m);
+    if (one.blocker) {
+      EXPECT_EQ(one.blocker->distance_m, all.blocker->distance_m);
+    }
     ASSERT_EQ(one.profile.size(), all.profile.size());
     for (std::size_t k = 0; k < one.profile.size(); ++k) {
       EXPECT_EQ(one.profile[k].ground, all.profile[k].ground);
@@ -408,7 +410,7 @@ TEST_F(TiledBuild, CommandsThatTakeAllOfAScenePayHeedToMemory) {
         "fly " + scene_ + " -o " + folder_->path("never"), "sight " + scene_ + ground,
         "viewshed " + scene_ + " --observer=401900,5198200 -o " + folder_->path("never.tif"),
         "preview " + scene_ + " --observer=401900,5198200 -o " + folder_->path("never.png")}) {
-    const RunResult run = run_scarp("$SCARP " + command + " --memory 100K");
+    const RunResult run = run_scarp("$SCARP " + command + " --memory 10K");
     EXPECT_EQ(run.exit_code, 1) << command;
     EXPECT_NE(run.errors.find("and --memory allows 0.00 GiB; raise --memory"), std::string::npos)
         << command << "\n"
