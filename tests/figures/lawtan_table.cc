@@ -33,6 +33,7 @@
 #include "core/occlusion/virtual_occluders.h"
 #include "core/raster/rasterise.h"
 #include "core/sight/triangle_sight.h"
+#include "core/threads/parallel_for.h"
 
 namespace scarp {
 namespace {
@@ -412,6 +413,8 @@ void write_views(const std::string& path, std::size_t frame, const std::string& 
 
 int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "";
+  // Waiting for work takes processor time too: one thread, so that only work is measured.
+  scarp::set_thread_count(1);
   if (what == "towers" && argc == 5)
     scarp::print_towers(std::atoi(argv[2]), std::atof(argv[3]), std::atof(argv[4]));
   else if (what == "walk" && (argc == 6 || argc == 7))
