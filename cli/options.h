@@ -194,8 +194,8 @@ struct FlyOptions {
   int pictures = 2;               ///< frames that are kept as pictures
   int movers = 0;                 ///< vehicles and aircraft
   std::uint32_t changes = 0;      ///< groups that come and go every few frames
-  double refine_px = 0;      ///< 0: not drawn with refinement
-  std::uint64_t budget = 0;  ///< 0: not drawn within a budget
+  double refine_px = 0;           ///< 0: not drawn with refinement
+  std::uint64_t budget = 0;       ///< 0: not drawn within a budget
 };
 
 struct PreviewCommandOptions {
