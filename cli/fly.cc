@@ -24,6 +24,7 @@
 #include "core/culling/image_culling.h"
 #include "core/culling/joint_hiding.h"
 #include "core/culling/mask_culling.h"
+#include "core/culling/object_tiles.h"
 #include "core/culling/occluder_hiding.h"
 #include "core/culling/query_culling.h"
 #include "core/culling/swept_culling.h"
@@ -64,15 +65,26 @@ constexpr double kEstimateShare = 0.25;
 struct Prepared {
   GroupBatches batches;
   BoxTree tree;
-  std::optional<CoarseBatches> coarse;  ///< where a method that asks coarse levels flies
-  double coarse_s = 0;
+  /// What queries ask for, where one of them flies: groups, large ones in tiles, and their levels.
+  ObjectTiles tiles;
+  std::optional<GroupBatches> tile_batches;
+  std::optional<CoarseBatches> coarse;
+  double tiles_s = 0, coarse_s = 0;  ///< to cut, and then to make the levels
 
-  Prepared(const LoadedScene& scene, bool with_coarse)
+  Prepared(const LoadedScene& scene, bool with_tiles, bool with_coarse)
       : batches(scene.tin, scene.groups), tree(batches) {
-    if (!with_coarse) return;
     const ProcessorStopwatch watch;
-    coarse.emplace(batches, std::vector(std::begin(kQueryShares), std::end(kQueryShares)));
+    if (with_tiles || with_coarse) {
+      tiles = cut_into_tiles(scene.tin, scene.groups);
+      tile_batches.emplace(scene.tin, tiles.tiles);
+    }
+    tiles_s = watch.seconds();
+    if (with_coarse) coarse.emplace(*tile_batches, query_shares());
     coarse_s = watch.seconds();
+  }
+
+  static std::vector<double> query_shares() {
+    return {std::begin(kQueryShares), std::end(kQueryShares)};
   }
 };
 
@@ -158,12 +170,19 @@ std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& p
   hom.opacity = kSmallGapOpacity;
   add_hom("hom-0.7", DepthTest::kPyramid);
   add("volume-scan", false, 0, 0, [&] { return std::make_unique<VolumeScanCulling>(batches); });
+  const auto in_tiles = [&](std::unique_ptr<CullingMethod> method) {
+    return std::make_unique<TiledCulling>(prepared.tiles, std::move(method));
+  };
   if (prepared.coarse)
     for (const QueryUse use : {QueryUse::kSameFrame, QueryUse::kNextFrame})
       add(use == QueryUse::kSameFrame ? "lod-query" : "multi-frame", false, prepared.coarse_s,
-          prepared.coarse->bytes(),
-          [&] { return std::make_unique<QueryCulling>(batches, *prepared.coarse, use); });
-  add("stop-and-wait", false, 0, 0, [&] { return std::make_unique<StopAndWaitCulling>(batches); });
+          prepared.coarse->bytes(), [&] {
+            return in_tiles(
+                std::make_unique<QueryCulling>(*prepared.tile_batches, *prepared.coarse, use));
+          });
+  if (prepared.tile_batches)
+    add("stop-and-wait", false, prepared.tiles_s, 0,
+        [&] { return in_tiles(std::make_unique<StopAndWaitCulling>(*prepared.tile_batches)); });
   for (const std::string& name : wanted)
     if (std::none_of(all.begin(), all.end(), [&](const Contender& c) { return c.label == name; }))
       throw Error(ErrorCode::kInput,
@@ -314,8 +333,9 @@ int run_fly(const FlyOptions& options) {
       options.path_file.empty()
           ? find_path(scene, route_of(options.route), options.frames, options.seed)
           : read_path(options.path_file);
-  const Prepared prepared(scene, options.budget > 0 || is_wanted(options.methods, "lod-query") ||
-                                     is_wanted(options.methods, "multi-frame"));
+  const Prepared prepared(
+      scene, is_wanted(options.methods, "stop-and-wait"),
+      is_wanted(options.methods, "lod-query") || is_wanted(options.methods, "multi-frame"));
   std::vector<Contender> contenders = contenders_of(scene, prepared, options.methods);
   if (options.changes > 0) keep_those_that_follow(scene, contenders, options.methods);
 
@@ -330,8 +350,9 @@ int run_fly(const FlyOptions& options) {
   plan.changes = options.changes;
   plan.seed = options.seed;
 
-  LevelFlight levels(scene.tin, scene.groups, prepared.batches,
-                     prepared.coarse ? &*prepared.coarse : nullptr,
+  std::optional<CoarseBatches> coarse;
+  if (options.budget > 0) coarse.emplace(prepared.batches, Prepared::query_shares());
+  LevelFlight levels(scene.tin, scene.groups, prepared.batches, coarse ? &*coarse : nullptr,
                      {options.refine_px, options.budget}, contenders.size());
   plan.see_groups = [&](std::size_t frame, std::size_t contender,
                         std::span<const GroupIndex> groups) {
