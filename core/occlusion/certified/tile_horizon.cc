@@ -69,10 +69,26 @@ CameraPart part_of(const TileHorizon& horizon, double sector, double sector_part
 
 /// Something with a centre and slopes of its own, as a part of a cell sees it.
 struct Seen {
-  double height_m;       // that its slopes start from
-  double near_m, far_m;  // distances of the part from its centre
-  double offset_m;       // of its centre from the tile's
+  double height_m;        // that its slopes start from
+  double near_m, far_m;   // distances of the part from its centre
+  double offset_m;        // of its centre from the tile's
+  double part_x, part_y;  // metres of the part's middle from its centre
 };
+
+/// A group or a tile, which have their centres alike.
+template <typename Centred>
+Seen seen_by(const CameraPart& part, const Centred& what, const TileHorizon& horizon) {
+  const double x = what.centre_x_m - horizon.centre_x_m;
+  const double y = what.centre_y_m - horizon.centre_y_m;
+  const double dx = part.x_m - x, dy = part.y_m - y;
+  const double away_m = std::hypot(dx, dy);
+  return {what.height_m,
+          away_m - part.reach_m,
+          away_m + part.reach_m,
+          std::hypot(x, y) * (1 + kPartOverlap),
+          dx,
+          dy};
+}
 
 /// The greatest slope from the tile's centre that stays under a line from the other's centre, for
 /// distances of the part from the one and of [near_m, far_m] from the other.
@@ -125,12 +141,7 @@ double slope_over_part(const TileHorizon& horizon, const CertifiedRegions& regio
                        std::uint32_t number, const CameraPart& part) {
   constexpr double kNone = -std::numeric_limits<double>::infinity();
   const CertifiedGroup& group = regions.groups[number];
-  const double x = group.centre_x_m - horizon.centre_x_m;
-  const double y = group.centre_y_m - horizon.centre_y_m;
-  const double dx = part.x_m - x, dy = part.y_m - y;
-  const double away_m = std::hypot(dx, dy);
-  const Seen seen{group.height_m, away_m - part.reach_m, away_m + part.reach_m,
-                  std::hypot(x, y) * (1 + kPartOverlap)};
+  const Seen seen = seen_by(part, group, horizon);
   if (seen.near_m <= 0) return kNone;
   const double unit_m = static_cast<double>(group.radius_m);
   const auto ring_at = [&](double d) {
@@ -139,7 +150,7 @@ double slope_over_part(const TileHorizon& horizon, const CertifiedRegions& regio
   const std::int32_t first_ring = ring_at(seen.near_m * (1 - kPartOverlap));
   const std::int32_t last_ring = ring_at(seen.far_m * (1 + kPartOverlap));
   if (first_ring < 0) return kNone;
-  const Azimuths azimuths = azimuths_of(part, dx, dy);
+  const Azimuths azimuths = azimuths_of(part, seen.part_x, seen.part_y);
   const auto sector_at = [&](double a) {
     return sector_of(regions.layout, std::cos(a), std::sin(a));
   };
@@ -156,16 +167,11 @@ double slope_over_part(const TileHorizon& horizon, const CertifiedRegions& regio
 double slope_over_part(const TileHorizon& horizon, const TileHorizon& tile,
                        const CameraPart& part) {
   constexpr double kNone = -std::numeric_limits<double>::infinity();
-  const double x = tile.centre_x_m - horizon.centre_x_m;
-  const double y = tile.centre_y_m - horizon.centre_y_m;
-  const double dx = part.x_m - x, dy = part.y_m - y;
-  const double away_m = std::hypot(dx, dy);
-  const Seen seen{tile.height_m, away_m - part.reach_m, away_m + part.reach_m,
-                  std::hypot(x, y) * (1 + kPartOverlap)};
+  const Seen seen = seen_by(part, tile, horizon);
   const double first = ring_place(tile, seen.near_m * (1 - kPartOverlap));
   const double last = ring_place(tile, seen.far_m * (1 + kPartOverlap));
   if (!(first >= 0 && last < tile.layout.rings)) return kNone;
-  const Azimuths azimuths = azimuths_of(part, dx, dy);
+  const Azimuths azimuths = azimuths_of(part, seen.part_x, seen.part_y);
   const std::int32_t last_sector = sector_place(tile, azimuths.to_rad);
   double least = std::numeric_limits<double>::infinity();
   for (std::int32_t s = sector_place(tile, azimuths.from_rad);; s = (s + 1) % tile.layout.sectors) {

@@ -3,12 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
+#include <optional>
 #include <random>
 
 #include "core/occlusion/certified/certify_groups.h"
 #include "core/occlusion/squares.h"
 #include "tests/support/terrain.h"
+#include "tests/support/tile_cameras.h"
 
 namespace scarp {
 namespace {
@@ -56,12 +57,6 @@ Valley valley_in_ridges(std::uint64_t seed, const HorizonLayout& layout = kTiles
   return valley;
 }
 
-bool hides_all_groups(const CertifiedRegions& regions, const Position& eye) {
-  for (std::uint32_t g = 0; g < regions.groups.size(); ++g)
-    if (!hides_group(regions, g, eye)) return false;
-  return true;
-}
-
 /// Cameras at and just under what the horizon says: every group's own region hides it too.
 TEST(TileHorizon, HidesNothingThatAGroupsRegionShows) {
   std::mt19937_64 random(5);
@@ -70,26 +65,14 @@ TEST(TileHorizon, HidesNothingThatAGroupsRegionShows) {
     const TileHorizon& horizon = valley.horizon;
     int hidden = 0;
     for (int i = 0; i < 4000; ++i) {
-      const auto uniform = [&](double low, double high) {
-        return std::uniform_real_distribution<double>(low, high)(random);
-      };
-      const double away_m = horizon.radius_m * std::exp2(uniform(-0.1, 6.1));
-      const double azimuth = uniform(0, 2 * std::numbers::pi);
-      Position eye{round_to_lattice(horizon.centre_x_m + away_m * std::cos(azimuth)),
-                   round_to_lattice(horizon.centre_y_m + away_m * std::sin(azimuth)),
-                   horizon.height_m - 3 * away_m};
-      if (!hides_tile(horizon, eye)) continue;
-      // Climbs to the highest lattice height that is hidden.
-      double low_m = eye.z_m, high_m = horizon.height_m + 3 * away_m;
-      while (high_m - low_m > 2 * kLatticeStepM) {
-        eye.z_m = round_to_lattice((low_m + high_m) / 2);
-        (hides_tile(horizon, eye) ? low_m : high_m) = eye.z_m;
-      }
-      eye.z_m = low_m;
+      std::optional<Position> eye = test::highest_hidden_camera(horizon, random);
+      if (!eye) continue;
       ++hidden;
-      ASSERT_TRUE(hides_all_groups(valley.regions, eye)) << eye.x_m << " " << eye.y_m;
-      eye.z_m = low_m - uniform(0, away_m);
-      ASSERT_TRUE(hides_all_groups(valley.regions, round_to_lattice(eye)));
+      ASSERT_TRUE(test::hides_all_groups(valley.regions, *eye)) << eye->x_m << " " << eye->y_m;
+      const double away_m =
+          std::hypot(eye->x_m - horizon.centre_x_m, eye->y_m - horizon.centre_y_m);
+      eye->z_m -= std::uniform_real_distribution<double>(0, away_m)(random);
+      ASSERT_TRUE(test::hides_all_groups(valley.regions, round_to_lattice(*eye)));
     }
     EXPECT_GT(hidden, 100) << seed;
   }

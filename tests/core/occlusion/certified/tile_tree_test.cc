@@ -5,12 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
+#include <optional>
 #include <random>
 
 #include "core/occlusion/certified/certify_groups.h"
 #include "core/occlusion/squares.h"
 #include "tests/support/terrain.h"
+#include "tests/support/tile_cameras.h"
 
 namespace scarp {
 namespace {
@@ -67,12 +68,6 @@ Hills hills(std::uint64_t seed) {
   return made;
 }
 
-bool hides_all_groups(const Groups& tile, const Position& eye) {
-  for (std::uint32_t g = 0; g < tile.leaf_count; ++g)
-    if (!hides_group(tile.certified, g, eye)) return false;
-  return true;
-}
-
 class TileTreeOfHills : public testing::Test {
  protected:
   static inline const Hills hills_ = hills(3);
@@ -85,34 +80,19 @@ TEST_F(TileTreeOfHills, NodesHideNothingThatAGroupBelowShows) {
   EXPECT_EQ(check_tile_tree(tree_), std::nullopt);
   EXPECT_EQ(check_tile_tree_bounds(tree_), std::nullopt);
   std::mt19937_64 random(5);
-  const auto uniform = [&](double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(random);
-  };
   std::array<int, 3> hidden{};
   for (int i = 0; i < 6000; ++i) {
     const TileNode& node = tree_.nodes[static_cast<std::size_t>(i) % tree_.nodes.size()];
-    const TileHorizon& horizon = node.horizon;
-    const double away_m = horizon.radius_m * std::exp2(uniform(-0.1, 6.1));
-    const double azimuth = uniform(0, 2 * std::numbers::pi);
-    Position eye{round_to_lattice(horizon.centre_x_m + away_m * std::cos(azimuth)),
-                 round_to_lattice(horizon.centre_y_m + away_m * std::sin(azimuth)),
-                 horizon.height_m - 3 * away_m};
-    if (!hides_tile(horizon, eye)) continue;
-    // Climbs to the highest lattice height that is hidden.
-    double low_m = eye.z_m, high_m = horizon.height_m + 3 * away_m;
-    while (high_m - low_m > 2 * kLatticeStepM) {
-      eye.z_m = round_to_lattice((low_m + high_m) / 2);
-      (hides_tile(horizon, eye) ? low_m : high_m) = eye.z_m;
-    }
-    eye.z_m = low_m;
+    const std::optional<Position> eye = test::highest_hidden_camera(node.horizon, random);
+    if (!eye) continue;
     ++hidden[static_cast<std::size_t>(node.tile.level)];
     const std::int32_t wide = kTilesAcross >> node.tile.level;
     for (std::int32_t k = 0; k < wide * wide; ++k) {
       const std::int32_t column = node.tile.column * wide + k % wide;
       const std::int32_t row = node.tile.row * wide + k / wide;
-      ASSERT_TRUE(hides_all_groups(
-          hills_.tiles[static_cast<std::size_t>(row * kTilesAcross + column)], eye))
-          << name_of(node.tile) << " " << eye.x_m << " " << eye.y_m << " " << eye.z_m;
+      const Groups& tile = hills_.tiles[static_cast<std::size_t>(row * kTilesAcross + column)];
+      ASSERT_TRUE(test::hides_all_groups(tile.certified, *eye))
+          << name_of(node.tile) << " " << eye->x_m << " " << eye->y_m << " " << eye->z_m;
     }
   }
   // Nothing stands around all of the ground that could hide the root.
