@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "tests/cli/written_dem.h"
 #include "tests/support/fractal_ground.h"
 #include "tests/support/run_scarp.h"
 #include "tests/support/temp_folder.h"
@@ -37,24 +38,17 @@ class ExportCulling : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new test::TempFolder;
-    GDALAllRegister();
-    const std::string dem = folder_->path("dem.tif");
-    GDALDataset* dataset = GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
-        dem.c_str(), kSide, kSide, 1, GDT_Int16, nullptr);
-    double transform[6] = {kLeft, kCellM, 0, kTop, 0, -kCellM};
-    dataset->SetGeoTransform(transform);
-    OGRSpatialReference crs;
-    crs.SetFromUserInput("EPSG:32632");
-    dataset->SetSpatialRef(&crs);
     const test::FractalGround ground(3);
+    std::vector<std::int16_t> all;
     for (int row = 0; row < kSide; ++row) {
       std::vector<std::int16_t> heights(kSide);
       ground.row(700, 900 + row, heights);
-      EXPECT_EQ(dataset->GetRasterBand(1)->RasterIO(GF_Write, 0, row, kSide, 1, heights.data(),
-                                                    kSide, 1, GDT_Int16, 0, 0),
-                CE_None);
+      all.insert(all.end(), heights.begin(), heights.end());
     }
-    GDALClose(dataset);
+    const std::string dem = test::write_dem(
+        folder_->path("dem.tif"),
+        {.columns = kSide, .rows = kSide, .left = kLeft, .top = kTop, .cell_m = kCellM},
+        std::move(all));
     for (const char* name : {"tiled", "whole"})
       ASSERT_EQ(run_scarp("$SCARP build '" + dem + "' -o '" + scene(name) +
                           "' --max-error 3 --fans 24 --group-triangles 40 "

@@ -12,6 +12,7 @@
 #include <set>
 #include <sstream>
 
+#include "tests/cli/written_dem.h"
 #include "tests/support/fractal_ground.h"
 #include "tests/support/glb_reader.h"
 #include "tests/support/netcdf_reader.h"
@@ -41,24 +42,14 @@ std::vector<std::int16_t> dem_row(int row) {
   return heights;
 }
 
-std::string write_dem(const std::string& path, int raised_m = 0) {
-  GDALAllRegister();
-  GDALDataset* dataset = GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
-      path.c_str(), kColumns, kRows, 1, GDT_Int16, nullptr);
-  double transform[6] = {kLeft, kCellM, 0, kTop, 0, -kCellM};
-  dataset->SetGeoTransform(transform);
-  OGRSpatialReference crs;
-  crs.SetFromUserInput("EPSG:32632");
-  dataset->SetSpatialRef(&crs);
-  for (int row = 0; row < kRows; ++row) {
-    std::vector<std::int16_t> heights = dem_row(row);
-    for (std::int16_t& h : heights) h = static_cast<std::int16_t>(h + raised_m);
-    EXPECT_EQ(dataset->GetRasterBand(1)->RasterIO(GF_Write, 0, row, kColumns, 1, heights.data(),
-                                                  kColumns, 1, GDT_Int16, 0, 0),
-              CE_None);
-  }
-  GDALClose(dataset);
-  return path;
+std::string write_mountains(const std::string& path, int raised_m = 0) {
+  std::vector<std::int16_t> all;
+  for (int row = 0; row < kRows; ++row)
+    for (const std::int16_t h : dem_row(row))
+      all.push_back(static_cast<std::int16_t>(h + raised_m));
+  return test::write_dem(
+      path, {.columns = kColumns, .rows = kRows, .left = kLeft, .top = kTop, .cell_m = kCellM},
+      std::move(all));
 }
 
 json read_json(const std::string& path) {
@@ -89,7 +80,7 @@ class Export : public testing::Test {
 
   static void SetUpTestSuite() {
     folder_ = new test::TempFolder;
-    const std::string dem = write_dem(folder_->path("dem.tif"));
+    const std::string dem = write_mountains(folder_->path("dem.tif"));
     built("$SCARP build " + dem + " -o " + scene() + kQuick + "--max-error 1 --tile-samples 64");
     built("$SCARP build " + dem + " -o " + one_tile() + kQuick + "--max-error 1");
     built("$SCARP export " + scene() + " --to 3dtiles -o " + tileset());
@@ -398,7 +389,7 @@ TEST_F(Export, UgridMeasuresEachTriangleAgainstItsDem) {
   EXPECT_GT(compared, 50U);
   const RunResult other =
       run_scarp("$SCARP export " + one_tile() + " --to ugrid --dem " +
-                write_dem(folder_->path("other.tif"), 1) + " -o " + folder_->path("refused"));
+                write_mountains(folder_->path("other.tif"), 1) + " -o " + folder_->path("refused"));
   EXPECT_EQ(other.exit_code, 1);
   EXPECT_NE(other.errors.find("not those of the scene"), std::string::npos) << other.errors;
 }

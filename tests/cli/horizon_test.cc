@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "tests/cli/written_dem.h"
 #include "tests/support/run_scarp.h"
 #include "tests/support/temp_folder.h"
 
@@ -23,23 +24,18 @@ class HorizonCommand : public testing::Test {
   static constexpr int kColumns = 12, kRows = 6;
 
   void SetUp() override {
-    GDALAllRegister();
-    dem_ = folder_.path("dem.tif");
-    GDALDataset* dataset = GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
-        dem_.c_str(), kColumns, kRows, 1, GDT_Float32, nullptr);
-    double transform[6] = {500'000, 100, 0, 4'000'000, 0, -100};
-    dataset->SetGeoTransform(transform);
-    OGRSpatialReference crs;
-    crs.SetFromUserInput("EPSG:32611");
-    dataset->SetSpatialRef(&crs);
     std::vector<float> heights(kColumns * kRows, 10);
     for (int r = 0; r < kRows; ++r) heights[static_cast<std::size_t>(r * kColumns + 5)] = 60;
     for (int c = 0; c < kColumns; ++c) heights[static_cast<std::size_t>(5 * kColumns + c)] = -99;
-    dataset->GetRasterBand(1)->SetNoDataValue(-99);
-    EXPECT_EQ(dataset->GetRasterBand(1)->RasterIO(GF_Write, 0, 0, kColumns, kRows, heights.data(),
-                                                  kColumns, kRows, GDT_Float32, 0, 0),
-              CE_None);
-    GDALClose(dataset);
+    dem_ = test::write_dem(folder_.path("dem.tif"),
+                           {.columns = kColumns,
+                            .rows = kRows,
+                            .left = 500'000,
+                            .top = 4'000'000,
+                            .cell_m = 100,
+                            .crs = "EPSG:32611",
+                            .nodata = -99},
+                           std::move(heights));
   }
 
   RunResult horizon(const std::string& options) {

@@ -1,12 +1,11 @@
 #include "tests/cli/served_terrain.h"
 
-#include <gdal_priv.h>
 #include <gtest/gtest.h>
-#include <ogr_spatialref.h>
 
 #include <cmath>
 #include <vector>
 
+#include "tests/cli/written_dem.h"
 #include "tests/support/run_scarp.h"
 
 namespace scarp::test {
@@ -14,16 +13,7 @@ namespace {
 
 constexpr int kColumns = 140, kRows = 120;
 
-void write_dem(const std::string& path) {
-  GDALAllRegister();
-  GDALDatasetUniquePtr dataset(GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
-      path.c_str(), kColumns, kRows, 1, GDT_Float32, nullptr));
-  // Around 473,150 E 5,155,050 N: 8.65 E, 46.55 N.
-  double transform[6] = {466'150, 100, 0, 5'161'050, 0, -100};
-  dataset->SetGeoTransform(transform);
-  OGRSpatialReference crs;
-  crs.SetFromUserInput("EPSG:32632");
-  dataset->SetSpatialRef(&crs);
+void write_hills(const std::string& path) {
   std::vector<float> heights(kColumns * kRows);
   for (int r = 0; r < kRows; ++r) {
     for (int c = 0; c < kColumns; ++c) {
@@ -34,16 +24,21 @@ void write_dem(const std::string& path) {
         heights[static_cast<std::size_t>(r * kColumns + c)] = -9999;
     }
   }
-  dataset->GetRasterBand(1)->SetNoDataValue(-9999);
-  EXPECT_EQ(dataset->GetRasterBand(1)->RasterIO(GF_Write, 0, 0, kColumns, kRows, heights.data(),
-                                                kColumns, kRows, GDT_Float32, 0, 0),
-            CE_None);
+  // Around 473,150 E 5,155,050 N: 8.65 E, 46.55 N.
+  write_dem(path,
+            {.columns = kColumns,
+             .rows = kRows,
+             .left = 466'150,
+             .top = 5'161'050,
+             .cell_m = 100,
+             .nodata = -9999},
+            std::move(heights));
 }
 
 }  // namespace
 
 ServedTerrain::ServedTerrain() {
-  write_dem(dem());
+  write_hills(dem());
   const RunResult built = run_scarp("$SCARP build " + dem() + " -o " + scene() +
                                     " --max-error 20 --fans 32 --sectors 16");
   EXPECT_EQ(built.exit_code, 0) << built.errors;

@@ -1,10 +1,9 @@
 #include "tests/cli/tiled_terrain.h"
 
-#include <gdal_priv.h>
-
 #include <cstdint>
 #include <vector>
 
+#include "tests/cli/written_dem.h"
 #include "tests/support/fractal_ground.h"
 #include "tiles/store/checksum.h"
 
@@ -13,30 +12,25 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string write_dem(const std::string& path) {
-  GDALAllRegister();
-  GDALDataset* dataset = GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
-      path.c_str(), kTiledColumns, kTiledRows, 1, GDT_Int16, nullptr);
-  double transform[6] = {400'000, 30, 0, 5'200'000, 0, -30};
-  dataset->SetGeoTransform(transform);
-  OGRSpatialReference crs;
-  crs.SetFromUserInput("EPSG:32632");
-  dataset->SetSpatialRef(&crs);
-  dataset->GetRasterBand(1)->SetNoDataValue(-1);
+std::string write_mountains(const std::string& path) {
   const FractalGround ground(3);
+  std::vector<std::int16_t> all;
   for (int row = 0; row < kTiledRows; ++row) {
     std::vector<std::int16_t> heights(kTiledColumns);
     ground.row(700, 900 + row, heights);
     for (int column = 0; column < kTiledColumns; ++column)
       if ((column - 80) * (column - 80) + (row - 70) * (row - 70) < 120)
         heights[static_cast<std::size_t>(column)] = -1;
-    EXPECT_EQ(
-        dataset->GetRasterBand(1)->RasterIO(GF_Write, 0, row, kTiledColumns, 1, heights.data(),
-                                            kTiledColumns, 1, GDT_Int16, 0, 0),
-        CE_None);
+    all.insert(all.end(), heights.begin(), heights.end());
   }
-  GDALClose(dataset);
-  return path;
+  return write_dem(path,
+                   {.columns = kTiledColumns,
+                    .rows = kTiledRows,
+                    .left = 400'000,
+                    .top = 5'200'000,
+                    .cell_m = 30,
+                    .nodata = -1},
+                   std::move(all));
 }
 
 constexpr char kQuick[] =
@@ -66,7 +60,7 @@ std::map<std::string, fs::file_time_type> records_of(const std::string& scene) {
 
 void TiledTerrain::SetUpTestSuite() {
   folder_ = new TempFolder;
-  dem_ = write_dem(folder_->path("dem.tif"));
+  dem_ = write_mountains(folder_->path("dem.tif"));
   scene_ = folder_->path("tiled.scene");
   built_ = run_scarp(build(scene_) + "--json");
 }

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "tests/cli/written_dem.h"
 #include "tests/support/run_scarp.h"
 #include "tests/support/temp_folder.h"
 
@@ -32,24 +33,19 @@ class ViewshedCommand : public testing::Test {
   /// @param more_m  on the samples of the ninth column, a hedge
   std::string write_dem(const std::string& name, int columns, float more_m,
                         const char* crs_name = "EPSG:32611") {
-    const std::string path = folder_.path(name);
-    GDALDataset* dataset = GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
-        path.c_str(), columns, kRows, 1, GDT_Float32, nullptr);
-    double transform[6] = {500'000, 100, 0, 4'000'000, 0, -100};
-    dataset->SetGeoTransform(transform);
-    OGRSpatialReference crs;
-    crs.SetFromUserInput(crs_name);
-    dataset->SetSpatialRef(&crs);
     std::vector<float> heights(static_cast<std::size_t>(columns * kRows), 10);
     for (int r = 0; r < kRows; ++r) heights[static_cast<std::size_t>(r * columns + 5)] = 50;
     for (int r = 0; r < kRows; ++r) heights[static_cast<std::size_t>(r * columns + 8)] += more_m;
     for (int c = 0; c < columns; ++c) heights[static_cast<std::size_t>(5 * columns + c)] = -99;
-    dataset->GetRasterBand(1)->SetNoDataValue(-99);
-    EXPECT_EQ(dataset->GetRasterBand(1)->RasterIO(GF_Write, 0, 0, columns, kRows, heights.data(),
-                                                  columns, kRows, GDT_Float32, 0, 0),
-              CE_None);
-    GDALClose(dataset);
-    return path;
+    return test::write_dem(folder_.path(name),
+                           {.columns = columns,
+                            .rows = kRows,
+                            .left = 500'000,
+                            .top = 4'000'000,
+                            .cell_m = 100,
+                            .crs = crs_name,
+                            .nodata = -99},
+                           std::move(heights));
   }
 
   RunResult view(const std::string& options, const std::string& output = "out.tif") {
