@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cassert>
+#include <filesystem>
 #include <fstream>
 
 #include "core/error/error.h"
@@ -58,12 +59,17 @@ std::optional<SectionFile> StepRun::open(const std::string& name) {
 }
 
 void StepRun::check_sources() const {
-  for (const PlanSource& source : plan().sources)
-    if (!(plan_source(source.path) == source))
-      throw Error(ErrorCode::kInput,
-                  fmt::format("'{}': changed while the scene was built from it; a file that stays "
-                              "as it is was expected; put it back and give --resume, or begin anew",
-                              source.path));
+  for (const PlanSource& source : plan().sources) {
+    if (plan_source(source.path) == source) continue;
+    std::error_code none;
+    const bool exists = std::filesystem::exists(source.path, none);
+    throw Error(ErrorCode::kInput,
+                fmt::format("'{}': {}; a file that stays as it is was expected; put it back and "
+                            "give --resume, or begin anew",
+                            source.path,
+                            exists ? "changed while the scene was built from it"
+                                   : "no such file any more, while the scene is built from it"));
+  }
 }
 
 void StepRun::finish() {
