@@ -7,7 +7,7 @@
 
 #include "cli/ground_eye.h"
 #include "cli/loaded_scene.h"
-#include "cli/scene_tiles.h"
+#include "cli/part_ground.h"
 #include "core/error/error.h"
 #include "core/sight/line_of_sight.h"
 #include "core/viewshed/grid_sight.h"
@@ -132,53 +132,22 @@ Foot foot_of(const TypedPosition& typed, const std::string& crs, const GeoFrame&
 }
 
 /// The tiles that a line passes over, or that one passes over that has an end raised or lowered.
-std::vector<std::size_t> tiles_for(const SceneTiles& tiles, const std::optional<TypedLine>& line) {
-  if (!line) return tiles.tiles_in({});
+AskedLines lines_of(const SceneTiles& tiles, const std::optional<TypedLine>& line) {
+  if (!line) return {tiles.tiles_in({}), {}};
   const Foot from = foot_of(line->from, line->crs, tiles.frame());
   const Foot to = foot_of(line->to, line->crs, tiles.frame());
-  return tiles.tiles_along(from.place, to.place, std::max(from.lean_m, to.lean_m));
-}
-
-/// Whether a line may meet the border of a surface. What lies beyond may be void, which is not
-/// known, or outside the data, which blocks nothing: only the whole scene tells the one from the
-/// other.
-bool may_meet_border(const Tin& tin, const Foot& from, const Foot& to) {
-  for (std::size_t t = 0; t < tin.triangles.size(); ++t) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (tin.neighbours[t][k] != kNone) continue;
-      const Position& a = tin.vertices[tin.triangles[t][(k + 1) % 3]];
-      const Position& b = tin.vertices[tin.triangles[t][(k + 2) % 3]];
-      TileContents edge;
-      edge.low = {std::min(a.x_m, b.x_m), std::min(a.y_m, b.y_m), 0};
-      edge.high = {std::max(a.x_m, b.x_m), std::max(a.y_m, b.y_m), 0};
-      if (may_meet_line(edge, from.place, to.place, std::max(from.lean_m, to.lean_m))) return true;
-    }
-  }
-  return false;
+  return {tiles.tiles_along(from.place, to.place, std::max(from.lean_m, to.lean_m)),
+          {{from.place, from.lean_m, {}}, {to.place, to.lean_m, {}}}};
 }
 
 /// The tiles along a line as one surface, or all where that does not do.
-Tin read_along(SceneTiles& tiles, const std::optional<TypedLine>& line,
-               std::uint64_t memory_bytes) {
-  constexpr char kRemedy[] = "raise --memory";
-  const std::vector<std::size_t> along = tiles_for(tiles, line);
-  Tin tin = tiles.read_within(along, memory_bytes, kRemedy);
-  if (along.size() == tiles.size()) return tin;
-  const Foot from = foot_of(line->from, line->crs, tiles.frame());
-  const Foot to = foot_of(line->to, line->crs, tiles.frame());
-  if (!along.empty() && !may_meet_border(tin, from, to)) return tin;
-  return tiles.read_within(tiles_for(tiles, {}), memory_bytes, kRemedy);
-}
-
-/// Tiles of a scene as one surface.
 struct SceneAlong {
   SceneAlong(const std::string& path, const std::optional<TypedLine>& line,
              std::uint64_t memory_bytes)
-      : tiles(path), tin(read_along(tiles, line, memory_bytes)), index(tin) {}
+      : tiles(path), ground(tiles, lines_of(tiles, line), memory_bytes, "raise --memory") {}
 
   SceneTiles tiles;
-  Tin tin;
-  TinIndex index;
+  PartGround ground;
 };
 
 }  // namespace
@@ -191,7 +160,8 @@ std::unique_ptr<SightSurface> open_surface(const std::vector<std::string>& sourc
     return std::make_unique<GridSurface>(
         std::make_shared<const Ground>(read_ground(sources, options, progress)));
   const auto along = std::make_shared<const SceneAlong>(*scene, line, options.memory_budget_bytes);
-  return std::make_unique<TinSurface>(along, along->index, along->tiles.frame(), &along->tiles);
+  return std::make_unique<TinSurface>(along, along->ground.index(), along->tiles.frame(),
+                                      &along->tiles);
 }
 
 std::unique_ptr<SightSurface> surface_over(std::shared_ptr<const ViewSource> source) {

@@ -59,9 +59,9 @@ struct TypedLine {
   std::string crs;  ///< empty: the data's
 };
 
-/// @param line  of a scene only the tiles along it are read, or all where the line may come upon
-/// void
-///              or leave the data; all answers about it are those of the whole scene. None: all
+/// @param line  of a scene only the tiles along it are read, or all where an end may lie over void
+///              that they do not know (PartGround); all answers about it are those of the whole
+///              scene. None: all
 /// Throws Error: what a scene or a DEM throws; kUsage where options for reading a DEM are given
 /// with a scene, or a scene is not alone.
 std::unique_ptr<SightSurface> open_surface(const std::vector<std::string>& sources,

@@ -44,22 +44,28 @@ bool same_cells(const Dem& a, const Dem& b) {
          near(5, height / a.rows);
 }
 
-/// The tiles that eyes reach; all where that is not known, or where they reach none.
-std::vector<std::size_t> tiles_for(const SceneTiles& scene, const std::optional<ViewReach>& reach) {
+/// The discs in which eyes see, in the plane; none where that is not known.
+std::vector<ViewPlan> discs_of(const SceneTiles& scene, const std::optional<ViewReach>& reach) {
   // Metres along the ground are those of the plane but for its flattening.
   constexpr double kMoreInPlane = 1.02;
-  std::vector<std::size_t> tiles;
-  for (std::size_t i = 0; i < scene.size(); ++i) {
-    const auto reaches = [&](const TypedPosition& eye) {
-      MapPoint point = to_map_point(eye, reach->crs, scene.frame());
-      point.height_m = 0;
-      return scene.meets(
-          i, {GeoFrame::Placer(scene.frame()).place(point), kMoreInPlane * reach->distance_m, {}});
-    };
-    if (!reach || std::any_of(reach->eyes.begin(), reach->eyes.end(), reaches)) tiles.push_back(i);
+  std::vector<ViewPlan> discs;
+  if (!reach) return discs;
+  const GeoFrame::Placer placer(scene.frame());
+  for (const TypedPosition& eye : reach->eyes) {
+    MapPoint point = to_map_point(eye, reach->crs, scene.frame());
+    point.height_m = 0;
+    discs.push_back({placer.place(point), kMoreInPlane * reach->distance_m, {}});
   }
-  if (!tiles.empty()) return tiles;
-  return tiles_for(scene, {});
+  return discs;
+}
+
+/// The tiles that discs meet; all where there are none of the ones or of the others.
+std::vector<std::size_t> tiles_for(const SceneTiles& scene, const std::vector<ViewPlan>& discs) {
+  std::vector<std::size_t> tiles;
+  for (std::size_t i = 0; i < scene.size(); ++i)
+    if (std::ranges::any_of(discs, [&](const ViewPlan& disc) { return scene.meets(i, disc); }))
+      tiles.push_back(i);
+  return tiles.empty() ? scene.tiles_in({}) : tiles;
 }
 
 /// The raster that a scene was made from.
@@ -103,10 +109,12 @@ ViewSource::SceneGround::SceneGround(const std::string& path, const std::optiona
                                      std::uint64_t memory_bytes)
     : tiles(path),
       dem(dem_of(tiles.scene().description())),
-      part(place_part(dem, tiles.window_of(tiles_for(tiles, reach)))),
-      used(tiles.tiles_over({part.first_column, part.first_row, part.columns, part.rows, 1})),
-      tin(tiles.read_within(used, memory_bytes, "raise --memory, or give --max-distance")),
-      index(tin) {}
+      discs(discs_of(tiles, reach)),
+      part(place_part(dem, tiles.window_of(tiles_for(tiles, discs)))),
+      ground(tiles,
+             {tiles.tiles_over({part.first_column, part.first_row, part.columns, part.rows, 1}),
+              discs},
+             memory_bytes, "raise --memory, or give --max-distance") {}
 
 void ViewSource::stand_on_scene() {
   const PartPlacement& part = scene_->part;
@@ -117,7 +125,7 @@ void ViewSource::stand_on_scene() {
   dem.geotransform[0] += part.first_column * dem.geotransform[1];
   dem.geotransform[3] += part.first_row * dem.geotransform[5];
   ground_.grid = GroundGrid(part.columns, part.rows, part.placement);
-  stand_on(scene_->index, ground_.grid);
+  stand_on(scene_->index(), ground_.grid);
 }
 
 void ViewSource::read_obstacles(const std::vector<std::string>& files, const DemOptions& options) {
@@ -162,7 +170,8 @@ void ViewSource::approximate(Accuracy accuracy) {
 }
 
 ViewGround ViewSource::ground() const {
-  if (scene_ && accuracy_ == Accuracy::kExact) return ViewGround::of_tin(samples(), scene_->index);
+  if (scene_ && accuracy_ == Accuracy::kExact)
+    return ViewGround::of_tin(samples(), scene_->index());
   ViewGround ground =
       obstacles_ ? ViewGround::under(samples(), *obstacles_) : ViewGround(samples());
   ground.tops = &*tops_;
@@ -174,7 +183,7 @@ ViewGround ViewSource::ground() const {
 std::uint64_t ViewSource::groups() const {
   if (!scene_) return 0;
   std::uint64_t groups = 0;
-  for (const std::size_t i : scene_->used)
+  for (const std::size_t i : scene_->used())
     if (scene_->tiles.tile(i).contents) groups += scene_->tiles.tile(i).contents->groups;
   return groups;
 }
@@ -183,11 +192,11 @@ std::vector<GroupIndex> ViewSource::group_of_samples() const {
   if (!scene_) return {};
   // Triangles of the surface are those of the tiles, one tile after the other.
   std::vector<GroupIndex> group_of_triangle;
-  for (const std::size_t i : scene_->used) {
+  for (const std::size_t i : scene_->used()) {
     const SceneTile& tile = scene_->tiles.tile(i);
-    const std::size_t triangles = tile.contents && scene_->used.size() > 1
+    const std::size_t triangles = tile.contents && scene_->used().size() > 1
                                       ? static_cast<std::size_t>(tile.contents->triangles)
-                                      : scene_->tin.triangles.size();
+                                      : scene_->tin().triangles.size();
     const Groups groups = read_tile_groups(scene_->tiles.scene(), tile, triangles);
     for (const GroupIndex group : groups.group_of_triangle)
       group_of_triangle.push_back(group == kNone ? kNone : scene_->tiles.first_group(i) + group);
@@ -198,7 +207,7 @@ std::vector<GroupIndex> ViewSource::group_of_samples() const {
   parallel_for(static_cast<std::size_t>(grid.rows()), [&](std::size_t r) {
     for (std::size_t c = 0; c < columns; ++c) {
       const Position at = grid.at(static_cast<std::int32_t>(c), static_cast<std::int32_t>(r));
-      const TriangleIndex triangle = scene_->index.triangle_at(at.x_m, at.y_m);
+      const TriangleIndex triangle = scene_->index().triangle_at(at.x_m, at.y_m);
       if (triangle != kNone && triangle < group_of_triangle.size())
         groups[r * columns + c] = group_of_triangle[triangle];
     }
@@ -219,12 +228,12 @@ std::uint64_t ViewSource::known_samples() const {
 GroundEye ViewSource::place(const TypedPosition& typed, const std::string& crs) const {
   if (!scene_) return place_eye(typed, crs, ground_);
   GroundEye eye;
-  eye.map = resolve(typed, crs, *dem().frame, scene_->index);
+  eye.map = resolve(typed, crs, *dem().frame, scene_->index());
   eye.position = GeoFrame::Placer(*dem().frame).place(eye.map);
   if (accuracy_ != Accuracy::kExact)
-    eye.position =
-        raised_over(eye.position, scene_->index.ground_height_m(eye.position.x_m, eye.position.y_m),
-                    ground_under_m(samples(), eye.position));
+    eye.position = raised_over(eye.position,
+                               scene_->index().ground_height_m(eye.position.x_m, eye.position.y_m),
+                               ground_under_m(samples(), eye.position));
   return eye;
 }
 

@@ -9,7 +9,7 @@
 
 #include "cli/ground_eye.h"
 #include "cli/options.h"
-#include "cli/scene_tiles.h"
+#include "cli/part_ground.h"
 #include "core/viewshed/viewshed.h"
 #include "ingest/dem/dem.h"
 
@@ -29,8 +29,9 @@ class ViewSource {
   /// with a scene, or a scene is not alone; kInput where obstacles do not share the DEM's cells.
   /// @param reach  of a scene of several tiles only those that the eyes reach are read, and the
   ///               raster is the rectangle of these, to the left and above to whole blocks of
-  ///               GroundGrid's placement, with all tiles in it: what is seen and what is void are
-  ///               those of the whole raster; none: all
+  ///               GroundGrid's placement, with all tiles in it. Where void that these cut
+  ///               might matter, all are read (PartGround), the raster is the same. What is seen
+  ///               and what is void are those of the whole raster. None: all
   ViewSource(const std::vector<std::string>& sources, const std::vector<std::string>& obstacles,
              const DemOptions& options, const Progress& progress,
              const std::optional<ViewReach>& reach = {});
@@ -60,8 +61,8 @@ class ViewSource {
   const Ground& dem_ground() const { return ground_; }
   /// Of a scene, the tiles that were read; null of a DEM.
   const SceneTiles* scene_tiles() const { return scene_ ? &scene_->tiles : nullptr; }
-  const TinIndex* tin_index() const { return scene_ ? &scene_->index : nullptr; }
-  std::uint64_t triangles() const { return scene_ ? scene_->tin.triangles.size() : 0; }
+  const TinIndex* tin_index() const { return scene_ ? &scene_->index() : nullptr; }
+  std::uint64_t triangles() const { return scene_ ? scene_->tin().triangles.size() : 0; }
   std::uint64_t groups() const;  ///< leaves, of the tiles used
   /// The group of the scene that each sample lies in, kNone where it is in none. [rows * columns]
   /// Empty for a DEM. Reads the groups of all tiles used. Throws as read_tile_groups.
@@ -80,11 +81,14 @@ class ViewSource {
                 std::uint64_t memory_bytes);
 
     SceneTiles tiles;
-    Dem dem;             ///< the scene's whole raster
+    Dem dem;  ///< the scene's whole raster
+    std::vector<ViewPlan> discs;
     PartPlacement part;  ///< of the raster's part that is looked at
-    std::vector<std::size_t> used;
-    Tin tin;
-    TinIndex index;
+    PartGround ground;
+
+    const std::vector<std::size_t>& used() const { return ground.used(); }
+    const Tin& tin() const { return ground.tin(); }
+    const TinIndex& index() const { return ground.index(); }
   };
 
   void stand_on_scene();

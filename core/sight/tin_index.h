@@ -62,6 +62,8 @@ class TinIndex {
 
   const Tin& tin() const { return tin_; }
   std::span<const MeshEdge> edges() const { return edges_; }
+  /// Border edges around voids that ground encloses.
+  std::span<const std::uint32_t> hole_edges() const { return hole_edges_; }
 
   /// Triangle that holds the lattice place (x_m, y_m), its border included; the lowest index where
   /// several do, kNone over void. Exact.
@@ -123,7 +125,7 @@ class TinIndex {
 
   const Tin& tin_;
   std::vector<MeshEdge> edges_;
-  std::vector<std::uint32_t> hole_edges_;  // border edges around voids enclosed by ground
+  std::vector<std::uint32_t> hole_edges_;
   double low_x_m_ = 0, low_y_m_ = 0, bin_m_ = 1;
   std::int32_t columns_ = 0, rows_ = 0;
   std::vector<std::uint32_t> first_triangle_, bin_triangles_;  // by bin, column by column

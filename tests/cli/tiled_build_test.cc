@@ -309,6 +309,43 @@ TEST_F(TiledBuild, ViewshedOfAPartIsTheCropOfTheWhole) {
   }
 }
 
+TEST_F(TiledBuild, VoidThatTilesCutIsAsUnknownAsInTheWhole) {
+  // Over the lake, which goes on beyond the only tile with ground that the eye reaches.
+  const std::string eye = "402415,5198155,1500asl", eyes = folder_->path("over.csv");
+  std::ofstream(eyes) << "x,y,elevation\n402415,5198155,1500\n";
+  for (const std::string mode : {"visible", "ground"}) {
+    const std::string part = folder_->path("cut.tif"), whole = folder_->path("uncut.tif");
+    const std::string ask =
+        "$SCARP viewshed " + scene_ + " --overwrite --max-distance 75 --mode " + mode;
+    const RunResult run = run_scarp(ask + " --observer=" + eye + " -o " + part);
+    ASSERT_EQ(run.exit_code, 0) << run.errors;
+    const RunResult all = run_scarp(ask + " --observers " + eyes + " -o " + whole);
+    ASSERT_EQ(all.exit_code, 0) << all.errors;
+    const auto expected = bits_by_place(whole), answer = bits_by_place(part);
+    EXPECT_LT(answer.size(), expected.size());
+    for (const auto& [place, bits] : answer)
+      ASSERT_EQ(bits, expected.at(place)) << mode << " " << place.first << " " << place.second;
+    // Ground within reach, all of it unknown.
+    if (mode == "visible") {
+      EXPECT_EQ(answer.at({402'415, 5'198'215}), std::bit_cast<std::uint32_t>(255.0F));
+    }
+  }
+  const TypedLine line{parse_position(eye), parse_position("402415,5198185,1500asl"), ""};
+  for (const auto& surface : {open_surface({scene_}, {}, {}, line), open_surface({scene_}, {}, {})})
+    EXPECT_EQ(surface->judge(surface->place(line.from, "").position,
+                             surface->place(line.to, "").position),
+              Sight::kUnknown);
+}
+
+TEST_F(TiledBuild, BorderOfTheRasterOpensNoTilesThatAreNotReached) {
+  const RunResult run =
+      run_scarp("$SCARP viewshed " + scene_ +
+                " --observer=400300,5199700,40 --max-distance 600 --overwrite --json -o " +
+                folder_->path("corner.tif"));
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  EXPECT_EQ(json::parse(run.output)["tiles_read"], 1);
+}
+
 TEST_F(TiledBuild, SightReadsTheTilesAlongTheLineAndAnswersAsTheWholeScene) {
   const auto whole = open_surface({scene_}, {}, {});
   EXPECT_EQ(whole->tiles_read(), 6U);
