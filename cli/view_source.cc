@@ -85,6 +85,36 @@ PartPlacement place_part(const Dem& dem, const TileWindow& window) {
                                   window.rows);
 }
 
+/// The rectangle of a part's samples that eyes reach, with some to spare; the part where there is
+/// none.
+PartPlacement crop_to_reach(PartPlacement part, const std::vector<ViewPlan>& discs,
+                            double distance_m, const GeoFrame& frame) {
+  // Places of samples are those without their heights here, whose normals lean by metres at most.
+  constexpr double kMoreM = 20, kMore = 1.001;
+  constexpr std::int32_t kMoreSamples = 2;
+  const GroundGrid samples(part.columns, part.rows, part.placement);
+  SampleWindow all{part.columns, part.rows, -1, -1};
+  for (const ViewPlan& disc : discs) {
+    const SampleWindow one = reach_window(
+        samples, disc.eye, EyeBearings(disc.eye, frame.earth_frame()), kMore * distance_m + kMoreM);
+    if (one.last_column < one.first_column || one.last_row < one.first_row) continue;
+    all = {std::min(all.first_column, one.first_column), std::min(all.first_row, one.first_row),
+           std::max(all.last_column, one.last_column), std::max(all.last_row, one.last_row)};
+  }
+  if (all.last_column < 0) return part;
+  // What is thinned keeps the samples that it keeps of the whole.
+  const auto low = [](std::int32_t first) {
+    return std::max(0, first - kMoreSamples) / ThinnedGround::kStep * ThinnedGround::kStep;
+  };
+  const std::int32_t left = low(all.first_column), above = low(all.first_row);
+  PartPlacement cropped = part_of(part.placement, part.columns, left, above,
+                                  std::min(part.columns, all.last_column + 1 + kMoreSamples) - left,
+                                  std::min(part.rows, all.last_row + 1 + kMoreSamples) - above);
+  cropped.first_column += part.first_column;
+  cropped.first_row += part.first_row;
+  return cropped;
+}
+
 }  // namespace
 
 ViewSource::ViewSource(const std::vector<std::string>& sources,
@@ -110,11 +140,12 @@ ViewSource::SceneGround::SceneGround(const std::string& path, const std::optiona
     : tiles(path),
       dem(dem_of(tiles.scene().description())),
       discs(discs_of(tiles, reach)),
-      part(place_part(dem, tiles.window_of(tiles_for(tiles, discs)))),
-      ground(tiles,
-             {tiles.tiles_over({part.first_column, part.first_row, part.columns, part.rows, 1}),
-              discs},
-             memory_bytes, "raise --memory, or give --max-distance") {}
+      window(tiles.window_of(tiles_for(tiles, discs))),
+      part(place_part(dem, window)),
+      ground(tiles, {tiles.tiles_over(window), discs}, memory_bytes,
+             "raise --memory, or give --max-distance") {
+  if (reach) part = crop_to_reach(std::move(part), discs, reach->distance_m, tiles.frame());
+}
 
 void ViewSource::stand_on_scene() {
   const PartPlacement& part = scene_->part;

@@ -52,6 +52,28 @@ struct Meeting {
   bool above;  ///< strictly above the line
 };
 
+/// Calls found(meeting) where an edge, or an end of it, lies under or above the open segment a-b
+/// (not vertical), until it returns true.
+template <class Found>
+bool visit_meetings_of(const TinIndex& index, const MeshEdge& edge, const Position& a,
+                       const Position& b, Found found) {
+  const std::vector<Position>& vertices = index.tin().vertices;
+  const auto visit_vertex = [&](VertexIndex w) {
+    const Position& p = vertices[w];
+    return is_between(a, b, p) && found(Meeting{w, w, above_line(a, b, p) > 0});
+  };
+  const Position& u = vertices[edge.from];
+  const Position& v = vertices[edge.to];
+  const int u_side = orient2d(a, b, u), v_side = orient2d(a, b, v);
+  if (u_side * v_side > 0) return false;
+  if (u_side == 0 && visit_vertex(edge.from)) return true;
+  if (v_side == 0 && visit_vertex(edge.to)) return true;
+  if (u_side * v_side == 0 || orient2d(u, v, a) * orient2d(u, v, b) >= 0) return false;
+  // Where v lies on the left, a-u-v is counter-clockwise, and the edge is above the line exactly
+  // where b lies below their plane; where v lies on the right, the sign is the other one.
+  return found(Meeting{edge.from, edge.to, orient3d(a, u, v, b) * v_side < 0});
+}
+
 /// Calls found(meeting) for each vertex and edge under or above the open segment a-b (not
 /// vertical), until it returns true; those that the floor leaves out may be missing. An edge that
 /// runs along the segment in plan counts by its vertices and by the triangles at the segment's
@@ -59,24 +81,9 @@ struct Meeting {
 template <class Found>
 bool visit_meetings(const TinIndex& index, const Position& a, const Position& b,
                     const HeightFloor& floor, Found found) {
-  const std::vector<Position>& vertices = index.tin().vertices;
   const std::array<Position, 2> ends{a, b};
-  const auto visit_vertex = [&](VertexIndex w) {
-    const Position& p = vertices[w];
-    return is_between(a, b, p) && found(Meeting{w, w, above_line(a, b, p) > 0});
-  };
   return index.visit_edges(ends, floor, [&](std::uint32_t e) {
-    const MeshEdge& edge = index.edges()[e];
-    const Position& u = vertices[edge.from];
-    const Position& v = vertices[edge.to];
-    const int u_side = orient2d(a, b, u), v_side = orient2d(a, b, v);
-    if (u_side * v_side > 0) return false;
-    if (u_side == 0 && visit_vertex(edge.from)) return true;
-    if (v_side == 0 && visit_vertex(edge.to)) return true;
-    if (u_side * v_side == 0 || orient2d(u, v, a) * orient2d(u, v, b) >= 0) return false;
-    // Where v lies on the left, a-u-v is counter-clockwise, and the edge is above the line exactly
-    // where b lies below their plane; where v lies on the right, the sign is the other one.
-    return found(Meeting{edge.from, edge.to, orient3d(a, u, v, b) * v_side < 0});
+    return visit_meetings_of(index, index.edges()[e], a, b, found);
   });
 }
 
@@ -194,11 +201,19 @@ bool is_blocked(const TinIndex& index, const Position& a, const Position& b) {
          visit_obstacles(index, a, b, [](const Meeting&) { return true; });
 }
 
-Sight line_of_sight(const TinIndex& index, const Position& a, const Position& b) {
-  if (is_blocked(index, a, b)) return Sight::kHidden;
+bool is_blocked_by(const TinIndex& index, const MeshEdge& edge, const Position& a,
+                   const Position& b) {
+  return visit_meetings_of(index, edge, a, b, [](const Meeting& meeting) { return meeting.above; });
+}
+
+Sight unblocked_sight(const TinIndex& index, const Position& a, const Position& b) {
   if (is_over_enclosed_void(index, a) || is_over_enclosed_void(index, b)) return Sight::kUnknown;
   if (!same_place(a, b) && has_void_between_ground(index, a, b)) return Sight::kUnknown;
   return Sight::kVisible;
+}
+
+Sight line_of_sight(const TinIndex& index, const Position& a, const Position& b) {
+  return is_blocked(index, a, b) ? Sight::kHidden : unblocked_sight(index, a, b);
 }
 
 std::optional<Blocker> first_blocker(const TinIndex& index, const Position& a, const Position& b) {

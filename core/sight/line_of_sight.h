@@ -34,6 +34,14 @@ Sight line_of_sight(const TinIndex& index, const Position& a, const Position& b)
 /// void.
 bool is_blocked(const TinIndex& index, const Position& a, const Position& b);
 
+/// The same of one edge: whether it, or an end of it, is strictly above the open segment a-b where
+/// they cross in plan. Cost: six predicates at most.
+bool is_blocked_by(const TinIndex& index, const MeshEdge& edge, const Position& a,
+                   const Position& b);
+
+/// line_of_sight of a line that is not blocked. Cost: the bins along the line that have border.
+Sight unblocked_sight(const TinIndex& index, const Position& a, const Position& b);
+
 /// What stands in the way: an edge of the mesh strictly above the line where they cross in plan.
 struct Blocker {
   /// Place along the line, 0 at a, 1 at b. Relative error below 2^-51.

@@ -7,6 +7,7 @@
 
 #include "core/geodesy/predicates.h"
 #include "core/sight/lattice_algebra.h"
+#include "core/sight/triangle_walk.h"
 
 namespace scarp {
 namespace {
@@ -250,14 +251,7 @@ std::optional<int> TinIndex::above_ground(const Position& p) const {
 std::optional<double> TinIndex::ground_height_m(double x_m, double y_m) const {
   const TriangleIndex t = triangle_at(x_m, y_m);
   if (t == kNone) return {};
-  const Position& a = tin_.vertices[tin_.triangles[t][0]];
-  const Position& b = tin_.vertices[tin_.triangles[t][1]];
-  const Position& c = tin_.vertices[tin_.triangles[t][2]];
-  const double bx = b.x_m - a.x_m, by = b.y_m - a.y_m, cx = c.x_m - a.x_m, cy = c.y_m - a.y_m;
-  const double px = x_m - a.x_m, py = y_m - a.y_m;
-  const double area = bx * cy - by * cx;
-  const double towards_b = (px * cy - py * cx) / area, towards_c = (bx * py - by * px) / area;
-  return a.z_m + towards_b * (b.z_m - a.z_m) + towards_c * (c.z_m - a.z_m);
+  return height_in_plane_m(tin_, t, x_m, y_m);
 }
 
 bool TinIndex::is_in_hole(double x_m, double y_m) const {

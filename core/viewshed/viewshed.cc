@@ -73,12 +73,13 @@ float climb_to_pitch(const GroundGrid& grid, const EyeBearings& bearings, const 
   return pitch_at(least_m) > limits.max_pitch_rad ? kNever : least_m;
 }
 
-SweepCounts all_judged(const SampleWindow& window) {
+/// Counts of a view over a TIN.
+SweepCounts counts_of(const SampleWindow& window, std::uint64_t judged) {
   SweepCounts counts;
   if (window.last_column < window.first_column || window.last_row < window.first_row) return counts;
-  counts.targets = counts.traced_whole =
-      static_cast<std::uint64_t>(window.last_column - window.first_column + 1) *
-      static_cast<std::uint64_t>(window.last_row - window.first_row + 1);
+  counts.targets = static_cast<std::uint64_t>(window.last_column - window.first_column + 1) *
+                   static_cast<std::uint64_t>(window.last_row - window.first_row + 1);
+  counts.traced_whole = judged;
   return counts;
 }
 
@@ -163,8 +164,7 @@ SampleWindow heights_from(const ViewGround& ground, const std::optional<EarthFra
   const SampleWindow window = window_of(grid, eye, bearings);
   SweepCounts found;
   if (ground.tin) {
-    tin_heights(*ground.tin, grid, eye.position, window, least_m);
-    found = all_judged(window);
+    found = counts_of(window, tin_heights(*ground.tin, grid, eye.position, window, least_m));
   } else {
     found = sweep_heights(ground.swept(), eye.position, window, least_m);
   }
@@ -235,8 +235,8 @@ SampleWindow view_from(const ViewGround& ground, const std::optional<EarthFrame>
   const SampleWindow window = window_of(grid, eye, bearings);
   SweepCounts found;
   if (ground.tin) {
-    tin_viewshed(*ground.tin, grid, eye.position, eye.target_height_m, window, sight, progress);
-    found = all_judged(window);
+    found = counts_of(window, tin_viewshed(*ground.tin, grid, eye.position, eye.target_height_m,
+                                           window, sight, progress));
   } else {
     found = sweep_viewshed(ground.swept(), eye.position, eye.target_height_m, window, sight);
   }
