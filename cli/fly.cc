@@ -134,9 +134,11 @@ std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& p
       add(method, is_certified, NAN, region_bytes(scene.groups, method),
           [&] { return culling_method(scene, method); });
   }
-  if (scene.groups.has_certified())
-    add("swept", true, NAN, region_bytes(scene.groups, "certified"),
-        [&] { return std::make_unique<SweptCulling>(scene.groups.certified, batches); });
+  if (scene.groups.has_certified() && is_wanted(wanted, "swept")) {
+    auto swept = std::make_unique<SweptCulling>(scene.groups.certified, batches);
+    const std::size_t bytes = region_bytes(scene.groups, "certified") + swept->bytes();
+    add("swept", true, NAN, bytes, [&] { return std::move(swept); });
+  }
   add("hzb", true, 0, 0, [&] { return std::make_unique<HzbCulling>(scene.tin, batches); });
   add("mask", false, 0, 0,
       [&] { return std::make_unique<MaskCulling>(scene.tin, batches, prepared.tree); });

@@ -61,13 +61,15 @@ struct Block {
 };
 
 /// Fills a block with the next groups in view.
-/// @return the first group that was not looked at
-std::size_t fill(const CertifiedRegions& regions, const ViewWedge* wedge, std::size_t next,
-                 Block& block) {
+/// @param among  numbers of groups, or null: all of them
+/// @return the first of `count` that was not looked at
+std::size_t fill(const CertifiedRegions& regions, const ViewWedge* wedge, const GroupIndex* among,
+                 std::size_t next, std::size_t count, Block& block) {
   block.count = 0;
-  for (; next < regions.groups.size() && block.count < kBlock; ++next) {
-    block.group[block.count] = static_cast<GroupIndex>(next);
-    block.count += wedge == nullptr || wedge->may_show(regions.groups[next]);
+  for (; next < count && block.count < kBlock; ++next) {
+    const GroupIndex group = among == nullptr ? static_cast<GroupIndex>(next) : among[next];
+    block.group[block.count] = group;
+    block.count += wedge == nullptr || wedge->may_show(regions.groups[group]);
   }
   return next;
 }
@@ -97,13 +99,24 @@ CertifiedCulling::CertifiedCulling(const CertifiedRegions& regions) : regions_(r
 
 std::size_t CertifiedCulling::visible_into(const Camera& camera,
                                            std::span<GroupIndex> visible) const {
-  assert(visible.size() == regions_.groups.size());
+  return find_visible(camera, nullptr, regions_.groups.size(), visible);
+}
+
+std::size_t CertifiedCulling::visible_among(const Camera& camera,
+                                            std::span<const GroupIndex> groups,
+                                            std::span<GroupIndex> visible) const {
+  return find_visible(camera, groups.data(), groups.size(), visible);
+}
+
+std::size_t CertifiedCulling::find_visible(const Camera& camera, const GroupIndex* among,
+                                           std::size_t count, std::span<GroupIndex> visible) const {
+  assert(visible.size() >= count);
   const ViewWedge wedge(camera.eye, camera.view.value_or(ViewRange{0, 100}));
   Block block;
   std::size_t found = 0;
-  for (std::size_t next = 0; next < regions_.groups.size();) {
+  for (std::size_t next = 0; next < count;) {
     // The view first: it costs a few multiplications, a look-up mostly a miss of the cache.
-    next = fill(regions_, wedge.shows_all() ? nullptr : &wedge, next, block);
+    next = fill(regions_, wedge.shows_all() ? nullptr : &wedge, among, next, count, block);
     place_camera(regions_, camera.eye, block);
     for (std::size_t i = 0; i < block.count; ++i)
       __builtin_prefetch(&regions_.at(block.group[i], block.sector[i]));

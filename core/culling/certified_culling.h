@@ -25,7 +25,15 @@ class CertifiedCulling : public CullingMethod {
   /// @return how many are visible
   std::size_t visible_into(const Camera& camera, std::span<GroupIndex> visible) const;
 
+  /// Of some groups only. The view is computed again with every call.
+  /// @param visible  as long as groups
+  std::size_t visible_among(const Camera& camera, std::span<const GroupIndex> groups,
+                            std::span<GroupIndex> visible) const;
+
  private:
+  std::size_t find_visible(const Camera& camera, const GroupIndex* among, std::size_t count,
+                           std::span<GroupIndex> visible) const;
+
   const CertifiedRegions& regions_;
 };
 

@@ -1,18 +1,12 @@
 #include "core/culling/rising_horizon.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
 
 namespace scarp {
 namespace {
-
-/// Relative allowance in every comparison: far above what double loses between the lattice and
-/// here, as no edge is interpolated that is shorter than kLeastEdge.
-constexpr double kRounding = 0x1p-30;
-
-/// Across: shorter edges are not interpolated along, because a place on them is not exact enough.
-constexpr double kLeastEdge = 0x1p-12;
 
 /// An edge in (across, up), from left to right.
 class Edge {
@@ -46,11 +40,8 @@ std::array<AheadPoint, 3> sorted(std::array<AheadPoint, 3> t) {
 }
 
 double rounding_of(const std::array<AheadPoint, 3>& t) {
-  return kRounding * (std::abs(t[0].up) + std::abs(t[1].up) + std::abs(t[2].up));
+  return kHorizonRounding * (std::abs(t[0].up) + std::abs(t[1].up) + std::abs(t[2].up));
 }
-
-/// Farther beside the view than this no place is exact enough.
-constexpr double kMostAcross = 1024;
 
 bool is_placed(const AheadPoint& p) {
   return p.ahead_m >= kNearestAheadM && std::abs(p.across) <= kMostAcross;
@@ -62,7 +53,6 @@ bool are_placed(const std::array<AheadPoint, 3>& t) {
 
 /// Whether the eye is under the triangle's plane for certain: then it sees none of its upper side.
 bool faces_away(const std::array<AheadPoint, 3>& t) {
-  constexpr double kAreaRounding = 0x1p-44;  // of products of two places
   const double ax = t[1].across - t[0].across, ay = t[1].up - t[0].up;
   const double bx = t[2].across - t[0].across, by = t[2].up - t[0].up;
   const double wide = 1 + std::abs(t[0].across) + std::abs(t[1].across) + std::abs(t[2].across);
@@ -77,46 +67,51 @@ bool RisingHorizon::begin(const Position& eye, const ViewRange& view) {
   if (width_rad < 0)
     width_rad += 2 * std::numbers::pi * std::ceil(-width_rad / (2 * std::numbers::pi));
   if (width_rad > kWidestRad) return false;
-  eye_ = eye;
   const double middle_rad = view.from_rad + width_rad / 2;
-  ahead_x_ = std::cos(middle_rad), ahead_y_ = std::sin(middle_rad);
-  right_ = std::tan(width_rad / 2) * (1 + kRounding) + kRounding;
-  left_ = -right_;
-  width_ = (right_ - left_) / kBins;
-  up_.fill(-HUGE_VAL);
-  farthest_m_.fill(0);
+  eye_ = {eye, std::cos(middle_rad), std::sin(middle_rad)};
+  bins_.right = std::tan(width_rad / 2) * (1 + kHorizonRounding) + kHorizonRounding;
+  bins_.left = -bins_.right;
+  bins_.width = (bins_.right - bins_.left) / kBins;
+  bins_.up.fill(-HUGE_VAL);
+  bins_.farthest_m.fill(0);
   return true;
 }
 
 AheadPoint RisingHorizon::place(const Position& position) const {
-  const double x_m = position.x_m - eye_.x_m, y_m = position.y_m - eye_.y_m;
+  const double x_m = position.x_m - eye_.at.x_m, y_m = position.y_m - eye_.at.y_m;
   AheadPoint p;
-  p.ahead_m = ahead_x_ * x_m + ahead_y_ * y_m;
-  p.right_m = ahead_y_ * x_m - ahead_x_ * y_m;
+  p.ahead_m = eye_.ahead_x * x_m + eye_.ahead_y * y_m;
+  p.right_m = eye_.ahead_y * x_m - eye_.ahead_x * y_m;
   const double each = 1 / p.ahead_m;
   p.across = p.right_m * each;
-  p.up = (position.z_m - eye_.z_m) * each;
+  p.up = (position.z_m - eye_.at.z_m) * each;
   return p;
 }
 
 double RisingHorizon::nearest_m(const Bounds& box) const {
-  return ahead_x_ * ((ahead_x_ > 0 ? box.low.x_m : box.high.x_m) - eye_.x_m) +
-         ahead_y_ * ((ahead_y_ > 0 ? box.low.y_m : box.high.y_m) - eye_.y_m);
+  return eye_.ahead_x * ((eye_.ahead_x > 0 ? box.low.x_m : box.high.x_m) - eye_.at.x_m) +
+         eye_.ahead_y * ((eye_.ahead_y > 0 ? box.low.y_m : box.high.y_m) - eye_.at.y_m);
 }
 
 int RisingHorizon::bin_of(double across) const {
-  return static_cast<int>(std::clamp((across - left_) / width_, 0.0, kBins - 1.0));
+  return static_cast<int>(std::clamp((across - bins_.left) / bins_.width, 0.0, kBins - 1.0));
 }
 
-bool RisingHorizon::is_beside(const std::array<AheadPoint, 3>& t) const {
+bool RisingHorizon::are_beside(std::span<const AheadPoint> corners) const {
   // The view is the wedge between its borders ahead: convex, so that corners decide.
   bool is_left = true, is_right = true, is_behind = true;
-  for (const AheadPoint& p : t) {
-    is_left &= p.right_m < left_ * p.ahead_m;
-    is_right &= p.right_m > right_ * p.ahead_m;
+  for (const AheadPoint& p : corners) {
+    is_left &= p.right_m < bins_.left * p.ahead_m;
+    is_right &= p.right_m > bins_.right * p.ahead_m;
     is_behind &= p.ahead_m < 0;
   }
   return is_left || is_right || is_behind;
+}
+
+bool RisingHorizon::is_beside(const Bounds& box) const {
+  const std::array<AheadPoint, 4> corners{place(box.low), place({box.low.x_m, box.high.y_m, 0}),
+                                          place({box.high.x_m, box.low.y_m, 0}), place(box.high)};
+  return are_beside(corners);
 }
 
 bool RisingHorizon::hides(const Bounds& box) const {
@@ -128,58 +123,61 @@ bool RisingHorizon::hides(const Bounds& box) const {
       least = std::min(least, p.across), most = std::max(most, p.across);
       top = std::max(top, p.up), nearest_m = std::min(nearest_m, p.ahead_m);
     }
-  if (most < left_ || least > right_) return true;
-  top += kRounding * std::abs(top);
-  const int last = bin_of(most + kRounding);
-  for (int bin = bin_of(least - kRounding); bin <= last; ++bin) {
+  if (most < bins_.left || least > bins_.right) return true;
+  top += kHorizonRounding * std::abs(top);
+  const int last = bin_of(most + kHorizonRounding);
+  for (int bin = bin_of(least - kHorizonRounding); bin <= last; ++bin) {
     const auto b = static_cast<std::size_t>(bin);
-    if (!(top < up_[b] && farthest_m_[b] <= nearest_m)) return false;
+    if (!(top < bins_.up[b] && bins_.farthest_m[b] <= nearest_m)) return false;
   }
   return true;
 }
 
 bool RisingHorizon::hides(const std::array<AheadPoint, 3>& triangle) const {
-  if (is_beside(triangle)) return true;
+  if (are_beside(triangle)) return true;
   if (!are_placed(triangle)) return false;
   if (faces_away(triangle)) return true;
   const auto t = sorted(triangle);
-  const double nearest_m = std::min({t[0].ahead_m, t[1].ahead_m, t[2].ahead_m});
+  return is_under_in_parts(t, std::min({t[0].ahead_m, t[1].ahead_m, t[2].ahead_m}),
+                           bin_of(t[0].across - kHorizonRounding),
+                           bin_of(t[2].across + kHorizonRounding));
+}
+
+bool RisingHorizon::is_under_in_parts(const std::array<AheadPoint, 3>& t, double nearest_m,
+                                      int first, int last) const {
   const double margin = rounding_of(t);
-  const int first = bin_of(t[0].across - kRounding), last = bin_of(t[2].across + kRounding);
   const Edge whole{t[0], t[2]}, one{t[0], t[1]}, other{t[1], t[2]};
   const double top = std::max({t[0].up, t[1].up, t[2].up}) + margin;
   for (int bin = first; bin <= last; ++bin) {
     const auto b = static_cast<std::size_t>(bin);
-    if (farthest_m_[b] > nearest_m) return false;
-    if (top < up_[b]) continue;
+    if (bins_.farthest_m[b] > nearest_m) return false;
+    if (top < bins_.up[b]) continue;
     if (last - first < 2) return false;
-    const double low = border(bin) - kRounding, high = border(bin + 1) + kRounding;
+    const double low = border(bin) - kHorizonRounding, high = border(bin + 1) + kHorizonRounding;
     const double here = std::max(
         {whole.most_within(low, high), one.most_within(low, high), other.most_within(low, high)});
-    if (!(here + margin < up_[b])) return false;
+    if (!(here + margin < bins_.up[b])) return false;
   }
   return true;
 }
 
 void RisingHorizon::add(const std::array<AheadPoint, 3>& triangle) {
-  // First what most triangles of fine ground are: narrower than a part of the view.
+  if (are_beside(triangle) || !are_placed(triangle)) return;
   const double least =
-      std::min({triangle[0].across, triangle[1].across, triangle[2].across}) + kRounding;
+      std::min({triangle[0].across, triangle[1].across, triangle[2].across}) + kHorizonRounding;
   const double most =
-      std::max({triangle[0].across, triangle[1].across, triangle[2].across}) - kRounding;
-  if (!(most - least >= width_ && most - least >= kLeastEdge)) return;
-  if (!are_placed(triangle)) return;
+      std::max({triangle[0].across, triangle[1].across, triangle[2].across}) - kHorizonRounding;
+  if (!(most - least >= kLeastEdge)) return;
   // Borders that it lies across: between two of them a straight line on it hides.
-  const int first =
-      static_cast<int>(std::ceil(std::clamp<double>((least - left_) / width_, 0, kBins)));
-  const int last = static_cast<int>(std::floor(std::min<double>(kBins, (most - left_) / width_)));
+  const auto border_of = [&](double across) {
+    return std::clamp<double>((across - bins_.left) / bins_.width, 0, kBins);
+  };
+  const int first = static_cast<int>(std::ceil(border_of(least)));
+  const int last = static_cast<int>(std::floor(border_of(most)));
   if (last <= first) return;
-  const double highest = std::max({triangle[0].up, triangle[1].up, triangle[2].up});
-  if (std::none_of(up_.begin() + first, up_.begin() + last,
-                   [&](double up) { return up < highest; }))
-    return;
   const auto t = sorted(triangle);
-  const double farthest_m = std::max({t[0].ahead_m, t[1].ahead_m, t[2].ahead_m}) * (1 + kRounding);
+  const double farthest_m =
+      std::max({t[0].ahead_m, t[1].ahead_m, t[2].ahead_m}) * (1 + kHorizonRounding);
   const double margin = rounding_of(t);
   const Edge whole{t[0], t[2]}, one{t[0], t[1]}, other{t[1], t[2]};
   const auto top_at = [&](double across) {
@@ -192,9 +190,46 @@ void RisingHorizon::add(const std::array<AheadPoint, 3>& triangle) {
     const auto b = static_cast<std::size_t>(bin);
     const double after = top_at(border(bin + 1));
     const double up = std::min(before, after) - margin;
-    if (up > up_[b]) up_[b] = up, farthest_m_[b] = farthest_m;
+    if (up > bins_.up[b]) bins_.up[b] = up, bins_.farthest_m[b] = farthest_m;
     before = after;
   }
+}
+
+/// Of triangles that were set up.
+bool RisingHorizon::shows_any(const SeenTriangles& seen) const {
+  if (seen.open != 0) return true;
+  for (std::uint64_t left = seen.facing; left != 0; left &= left - 1) {
+    const auto t = static_cast<std::size_t>(std::countr_zero(left));
+    if (is_under(bins_, seen, t)) continue;
+    const int first = static_cast<int>(seen.first[t]), last = static_cast<int>(seen.last[t]);
+    if (last - first < 2) return true;
+    const std::array<AheadPoint, 3> corners{AheadPoint{0, 0, seen.across0[t], seen.up0[t]},
+                                            AheadPoint{0, 0, seen.across1[t], seen.up1[t]},
+                                            AheadPoint{0, 0, seen.across2[t], seen.up2[t]}};
+    if (!is_under_in_parts(corners, seen.nearest_m[t], first, last)) return true;
+  }
+  return false;
+}
+
+bool RisingHorizon::shows(const HorizonTriangles::Group& triangles, bool adds) {
+  if (triangles.steps == nullptr) return true;
+  const std::size_t parts = (triangles.count + kSetUp - 1) / kSetUp;
+  if (seen_.size() < parts) seen_.resize(parts);
+  std::size_t ready = 0;
+  const auto set_up_next = [&] {
+    set_up(eye_, bins_, triangles.origin, triangles.steps + ready * 9 * kSetUp,
+           std::min(kSetUp, triangles.count - ready * kSetUp), seen_[ready]);
+    ++ready;
+  };
+  bool shown = false;
+  while (!shown && ready < parts) {
+    set_up_next();
+    shown = shows_any(seen_[ready - 1]);
+  }
+  if (!shown || !adds) return shown;
+  while (ready < parts) set_up_next();
+  for (std::size_t part = 0; part < parts; ++part) raise(seen_[part], bins_);
+  return true;
 }
 
 }  // namespace scarp

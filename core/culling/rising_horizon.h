@@ -2,9 +2,12 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/culling/camera.h"
+#include "core/culling/horizon_kernels.h"
+#include "core/culling/horizon_triangles.h"
 #include "core/terrain/tin.h"
 
 namespace scarp {
@@ -16,7 +19,6 @@ struct AheadPoint {
   double right_m = 0;
   double across = 0, up = 0;  ///< meaningless where ahead_m < kNearestAheadM
 };
-inline constexpr double kNearestAheadM = 0.5;
 
 /// How much of a view ground hides, by direction: a horizon from below, that rises as ground is
 /// added, with the distance at which it hides. The surface is a height field, so that what is
@@ -32,7 +34,7 @@ inline constexpr double kNearestAheadM = 0.5;
 /// Source: own, of the occlusion horizons of Downs, Möller and Séquin 2001.
 class RisingHorizon {
  public:
-  static constexpr int kBins = 512;
+  static constexpr int kBins = HorizonBins::kBins;
   /// Views that are wider are not asked: far sideways a metre ahead counts for little.
   static constexpr double kWidestRad = 2.6;
 
@@ -45,25 +47,37 @@ class RisingHorizon {
   /// The least metres ahead of a box; may be below zero.
   double nearest_m(const Bounds& box) const;
 
+  /// Whether all of a box lies beside the view, or behind the eye.
+  bool is_beside(const Bounds& box) const;
+
   /// Whether all of a box, or of the upper side of a triangle of the surface (its corners
   /// counter-clockwise from above), is hidden by what was added, or beside the view.
   /// Cost: the bins it spans.
   bool hides(const Bounds& box) const;
   bool hides(const std::array<AheadPoint, 3>& triangle) const;
 
-  /// Adds a triangle of the surface. Cost: the bins it spans.
+  /// Adds a triangle of the surface; one that is seen from behind adds nothing, because those
+  /// before it are as high. Cost: the bins it spans.
   void add(const std::array<AheadPoint, 3>& triangle);
 
+  /// Whether any of some triangles may be seen: is not hidden. If so, and where `adds`, adds all of
+  /// them. The same as for one after the other, in vectors, about 15 nanoseconds a triangle.
+  bool shows(const HorizonTriangles::Group& triangles, bool adds);
+
+  /// As it stands.
+  const HorizonBins& bins() const { return bins_; }
+
  private:
-  bool is_beside(const std::array<AheadPoint, 3>& triangle) const;
-  double border(int bin) const { return left_ + bin * width_; }
+  bool are_beside(std::span<const AheadPoint> corners) const;
+  bool is_under_in_parts(const std::array<AheadPoint, 3>& from_left, double nearest_m, int first,
+                         int last) const;
+  bool shows_any(const SeenTriangles& seen) const;
+  double border(int bin) const { return bins_.left + bin * bins_.width; }
   int bin_of(double across) const;
 
-  Position eye_{};
-  double ahead_x_ = 1, ahead_y_ = 0;         // unit vector, but for rounding
-  double left_ = 0, right_ = 0, width_ = 0;  // of the view, across
-  std::array<double, kBins> up_;             // what is lower is hidden
-  std::array<double, kBins> farthest_m_;     // where it is farther ahead than this
+  HorizonEye eye_;
+  HorizonBins bins_;
+  std::vector<SeenTriangles> seen_;  // of the triangles that are asked for, kSetUp each
 };
 
 }  // namespace scarp

@@ -1,43 +1,81 @@
 #include "core/culling/swept_culling.h"
 
 #include <algorithm>
+#include <cmath>
+
+#include "core/culling/box_tree.h"
 
 namespace scarp {
+namespace {
+
+/// Groups that are asked together whether they are in view, and under the horizon.
+constexpr std::uint32_t kGroupsABlock = 16;
+
+/// Blocks of which groups are looked up at once, so that look-ups overlap, which are mostly misses
+/// of the cache.
+constexpr std::size_t kBlocksAtOnce = 8;
+
+/// Groups that look smaller raise no horizon: they hide little, and regions know what is far away.
+constexpr double kLeastOccluderRad = 0.4;
+
+}  // namespace
 
 SweptCulling::SweptCulling(const CertifiedRegions& regions, const GroupBatches& batches)
-    : certified_(regions), batches_(batches) {}
+    : certified_(regions), batches_(batches), triangles_(batches) {
+  const BoxTree tree(batches);
+  const auto nodes = tree.nodes();
+  for (NodeIndex n = 0; n < nodes.size(); ++n) {
+    if (nodes[n].count > kGroupsABlock) continue;
+    const auto groups = tree.groups_of(nodes[n]);
+    blocks_.push_back({nodes[n].box, static_cast<std::uint32_t>(groups_.size()), nodes[n].count});
+    groups_.insert(groups_.end(), groups.begin(), groups.end());
+    n = tree.last_below(n);
+  }
+}
 
 /// Whether any of a group may be seen; what may be then hides what is behind it.
-bool SweptCulling::shows(GroupIndex group) {
-  if (horizon_.hides(batches_.box(group))) return false;
-  places_.clear();
-  for (const Position& p : batches_.vertices(group)) places_.push_back(horizon_.place(p));
-  const auto corners_of = [&](const std::array<VertexIndex, 3>& t) {
-    return std::array<AheadPoint, 3>{places_[t[0]], places_[t[1]], places_[t[2]]};
-  };
-  const auto triangles = batches_.corners(group);
-  if (std::all_of(triangles.begin(), triangles.end(),
-                  [&](const auto& t) { return horizon_.hides(corners_of(t)); }))
-    return false;
-  for (const auto& t : triangles) horizon_.add(corners_of(t));
-  return true;
+bool SweptCulling::shows(GroupIndex group, double nearest_m) {
+  const Bounds& box = batches_.box(group);
+  if (horizon_.hides(box)) return false;
+  const double width_m = std::hypot(box.high.x_m - box.low.x_m, box.high.y_m - box.low.y_m);
+  return horizon_.shows(triangles_.of(group), width_m >= kLeastOccluderRad * nearest_m);
+}
+
+/// The groups of blocks that are in view and not under the horizon, by nearest point, without those
+/// that the regions hide.
+void SweptCulling::look_up(const Camera& camera, std::span<const NearBlock> blocks) {
+  asked_.clear();
+  for (const auto& [nearest_m, b] : blocks) {
+    if (horizon_.hides(blocks_[b].box)) continue;
+    const auto first = groups_.begin() + blocks_[b].first;
+    asked_.insert(asked_.end(), first, first + blocks_[b].count);
+  }
+  left_.resize(asked_.size());
+  left_.resize(certified_.visible_among(camera, asked_, left_));
+  order_.clear();
+  for (const GroupIndex g : left_) order_.emplace_back(horizon_.nearest_m(batches_.box(g)), g);
+  std::sort(order_.begin(), order_.end());
 }
 
 std::size_t SweptCulling::visible_into(const Camera& camera, std::span<GroupIndex> visible) {
-  const std::size_t left = certified_.visible_into(camera, visible);
   is_swept_ = camera.view && horizon_.begin(camera.eye, *camera.view);
-  if (!is_swept_) return left;
-  order_.clear();
-  for (std::uint32_t i = 0; i < left; ++i)
-    order_.emplace_back(horizon_.nearest_m(batches_.box(visible[i])), i);
-  std::sort(order_.begin(), order_.end());
-  is_shown_.assign(left, 0);
-  for (const auto& [nearest_m, i] : order_) is_shown_[i] = shows(visible[i]);
+  if (!is_swept_) return certified_.visible_into(camera, visible);
+  near_.clear();
+  for (std::uint32_t b = 0; b < blocks_.size(); ++b)
+    if (!horizon_.is_beside(blocks_[b].box))
+      near_.emplace_back(horizon_.nearest_m(blocks_[b].box), b);
+  std::sort(near_.begin(), near_.end());
   std::size_t shown = 0;
-  for (std::size_t i = 0; i < left; ++i) {
-    visible[shown] = visible[i];
-    shown += is_shown_[i];
+  for (std::size_t next = 0; next < near_.size(); next += kBlocksAtOnce) {
+    look_up(camera, std::span(near_).subspan(next, std::min(kBlocksAtOnce, near_.size() - next)));
+    for (std::size_t i = 0; i < order_.size(); ++i) {
+      if (i + 1 < order_.size()) triangles_.prefetch(order_[i + 1].second);
+      const auto& [nearest_m, group] = order_[i];
+      visible[shown] = group;
+      shown += shows(group, nearest_m);
+    }
   }
+  std::sort(visible.begin(), visible.begin() + static_cast<std::ptrdiff_t>(shown));
   return shown;
 }
 

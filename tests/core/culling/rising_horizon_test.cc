@@ -1,10 +1,13 @@
 #include "core/culling/rising_horizon.h"
 
 #include <gtest/gtest.h>
+#include <hwy/targets.h>
 
 #include <algorithm>
 #include <cmath>
 #include <random>
+
+#include "tests/support/grouped_ground.h"
 
 namespace scarp {
 namespace {
@@ -178,6 +181,78 @@ TEST(RisingHorizon, EveryPointOfWhatItHidesIsBehindOneOfTheTrianglesAdded) {
   EXPECT_GT(hidden, 500U);
   EXPECT_GT(boxes, 100U);
   EXPECT_GT(asked, 10'000U);
+}
+
+/// A group's triangles one after the other.
+bool shows_plainly(RisingHorizon& horizon, const GroupBatches& batches, GroupIndex group,
+                   bool adds) {
+  std::vector<std::array<AheadPoint, 3>> triangles;
+  const auto vertices = batches.vertices(group);
+  for (const auto& t : batches.corners(group))
+    triangles.push_back({horizon.place(vertices[t[0]]), horizon.place(vertices[t[1]]),
+                         horizon.place(vertices[t[2]])});
+  const bool shown = !std::all_of(triangles.begin(), triangles.end(),
+                                  [&](const auto& t) { return horizon.hides(t); });
+  if (shown && adds)
+    for (const auto& t : triangles) horizon.add(t);
+  return shown;
+}
+
+TEST(RisingHorizon, ShowsTheSameWithEveryInstructionSetAsOneTriangleAfterTheOther) {
+  std::size_t shown = 0, hidden = 0;
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    std::mt19937_64 random(11);
+    const auto unit = [&] { return std::uniform_real_distribution<double>(0, 1)(random); };
+    for (unsigned seed = 1; seed <= 3; ++seed) {
+      const auto ground = test::grouped_hills(seed);
+      const GroupBatches batches(ground.tin, ground.groups);
+      const HorizonTriangles triangles(batches);
+      const Bounds all = bounds_of(ground.tin.vertices);
+      for (int i = 0; i < 6; ++i) {
+        // Under ground too: nothing is promised there, but the same.
+        const Position eye{all.low.x_m + unit() * (all.high.x_m - all.low.x_m),
+                           all.low.y_m + unit() * (all.high.y_m - all.low.y_m),
+                           all.low.z_m + (0.2 + unit()) * (all.high.z_m - all.low.z_m)};
+        const double turn_rad = 6 * unit();
+        const ViewRange view{turn_rad, turn_rad + 0.1 + 2.4 * unit()};
+        RisingHorizon fast, plain;
+        ASSERT_TRUE(fast.begin(eye, view) && plain.begin(eye, view));
+        std::vector<std::pair<double, GroupIndex>> order;
+        for (GroupIndex g = 0; g < batches.groups(); ++g)
+          order.emplace_back(plain.nearest_m(batches.box(g)), g);
+        std::sort(order.begin(), order.end());
+        for (const auto& [nearest_m, g] : order) {
+          const bool adds = g % 5 != 0;
+          const bool is_shown = fast.shows(triangles.of(g), adds);
+          ASSERT_EQ(is_shown, shows_plainly(plain, batches, g, adds))
+              << hwy::TargetName(target) << ", seed " << seed << ", group " << g;
+          (is_shown ? shown : hidden) += 1;
+          for (std::size_t b = 0; b < HorizonBins::kBins; ++b) {
+            ASSERT_EQ(fast.bins().up[b], plain.bins().up[b]) << hwy::TargetName(target);
+            ASSERT_EQ(fast.bins().farthest_m[b], plain.bins().farthest_m[b]);
+          }
+        }
+      }
+    }
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  EXPECT_GT(shown, 300U);
+  EXPECT_GT(hidden, 300U);
+}
+
+TEST(RisingHorizon, ShowsWhatIsTooWideToBeLaidOut) {
+  Tin tin;
+  tin.vertices = {{0, -4e5, 0}, {4e5, -4e5, 0}, {0, 4e5, 0}};
+  tin.triangles = {{0, 1, 2}};
+  Groups groups;
+  groups.leaf_count = 1;
+  groups.group_of_triangle = {0};
+  const GroupBatches batches(tin, groups);
+  const HorizonTriangles triangles(batches);
+  RisingHorizon horizon;
+  ASSERT_TRUE(horizon.begin({5e5, 0, 0}, kEast));
+  EXPECT_TRUE(horizon.shows(triangles.of(0), true)) << "behind the eye, but nobody knows";
 }
 
 }  // namespace
