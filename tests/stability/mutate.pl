@@ -20,7 +20,7 @@ sub print_table {
     chomp;
     my ($number, $expected, $margin, $how, $test) = split /\t/;
     push @margins, $margin unless $of{$margin};
-    $test =~ s/^(\w+)\.(\w+)/$1 =~ m{^(Wall|PieceTargets)$} ? $1 : $2/e;
+    $test =~ s/^(\w+)\.(\w+)/$1 =~ m{^(Wall|PieceTargets|ReachedCells)$} ? $1 : $2/e;
     my $unexpected = $expected eq 'red' && $test eq 'green' || $expected eq 'green' && $test ne 'green';
     $wrong ||= $unexpected;
     $how = "**$how**" if $unexpected;

@@ -22,6 +22,9 @@ struct SkyPlane {
   /// The same in another form: a camera beyond the edge and strictly under line_m + line_slope * u
   /// is hidden, too, on any ray of the fan that crosses the edge within a beam.
   double line_m, line_slope;
+  /// Rays over a piece that meet the edge within the beam lead this way: v for each metre of u.
+  double low_turn = -HUGE_VAL, high_turn = HUGE_VAL;
+  double beyond_m = -HUGE_VAL;  ///< the greatest u of the part that they meet
 };
 
 /// The lowest plane through an edge that has none of some places above it, on the side behind the

@@ -96,6 +96,23 @@ class Chain {
   const double least_turn_ = std::max(view_.fan.tan_half, kLeastTurn);
 };
 
+/// Which way rays lead from the line that a beam begins at to a part of an edge: that is linear
+/// over linear in both places, so the least and the most are at ends.
+void turn_rays(const FanView& view, const Beam& beam, const std::array<FanPlace, 2>& part,
+               SkyPlane& plane) {
+  double low = HUGE_VAL, high = -HUGE_VAL;
+  for (const FanPlace& p : {beam.from, beam.to})
+    for (const FanPlace& q : part) {
+      const double way_m = q.u_m - p.u_m;
+      if (!(way_m > kTooNear * view.error_m)) return;
+      const double turn = (q.v_m - p.v_m) / way_m;
+      const double error = 16 * view.error_m * (1 + std::abs(turn)) / way_m;
+      low = std::min(low, turn - error);
+      high = std::max(high, turn + error);
+    }
+  plane.low_turn = low, plane.high_turn = high;
+}
+
 /// The plane that an edge of the chain holds, with the better of two lines along rays.
 std::optional<SkyPlane> plane_over(const FanView& view, const std::array<FanPlace, 2>& edge,
                                    const std::array<FanPlace, 2>& part, const Places& targets) {
@@ -120,7 +137,6 @@ bool raise_wall(const RidgeEdges& ridges, const FanView& view, const Beam& beam,
                 const Places& targets, std::uint32_t edge, double slope, Wall& wall) {
   const std::vector<VertexIndex>& chain = wall.chain;
   if (!Chain(ridges, view, beam, slope).follow(ridges.edges[edge], wall.chain)) return false;
-  wall.u_m = -HUGE_VAL;
   wall.planes.clear();
   for (std::size_t i = 0; i + 1 < chain.size(); ++i) {
     const FanPlace &a = view.vertices[chain[i]], &b = view.vertices[chain[i + 1]];
@@ -129,12 +145,12 @@ bool raise_wall(const RidgeEdges& ridges, const FanView& view, const Beam& beam,
     cut(beam.high.at(a), beam.high.at(b), from, to);
     if (!(from <= to)) continue;
     const std::array<FanPlace, 2> ends{between(a, b, from), between(a, b, to)};
-    for (const FanPlace& end : ends) {
+    for (const FanPlace& end : ends)
       if (!(beam.ahead.at(end) > 8 * view.error_m)) return false;
-      wall.u_m = std::max(wall.u_m, end.u_m);
-    }
-    const auto plane = plane_over(view, {a, b}, ends, targets);
+    auto plane = plane_over(view, {a, b}, ends, targets);
     if (!plane) return false;
+    turn_rays(view, beam, ends, *plane);
+    plane->beyond_m = std::max(ends[0].u_m, ends[1].u_m);
     wall.planes.push_back(*plane);
   }
   return !wall.planes.empty();

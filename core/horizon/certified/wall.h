@@ -31,14 +31,18 @@ inline FanPlace between(const FanPlace& p, const FanPlace& q, double share) {
           p.z_m + share * (q.z_m - p.z_m)};
 }
 
-/// Where rays of a fan can be, beyond what they have come through: not negative in all three.
+/// Where rays of a fan can be, beyond the line from `from` to `to` that they have come through: not
+/// negative in all three.
 struct Beam {
   HalfPlane low, high, ahead;
+  FanPlace from, to;
 };
 
-/// What a chain of edges across a beam hides: cameras beyond u_m strictly under every plane.
+/// What a chain of edges across a beam hides: cameras beyond every edge (SkyPlane::beyond_m) and
+/// strictly under every plane. A ray crosses one of the edges at least, and it is enough that its
+/// camera is beyond that one and under its plane: so only those planes count that a ray of its
+/// direction can come through (SkyPlane::low_turn).
 struct Wall {
-  double u_m;
   std::vector<SkyPlane> planes;
   std::vector<VertexIndex> chain;  ///< by rising v; its memory is reused
 };
@@ -48,9 +52,9 @@ struct Wall {
 /// plane through the edge where all targets are behind it (EdgePlane), and one level across the fan
 /// where they are not, as from an edge that leads along the fan round a void (CurtainPlane).
 ///
-/// Why it is right. What of the chain is within the beam lies ahead of where the beam begins and
-/// nearer than wall.u_m, and leads from one side of the beam to the other, so every ray to a camera
-/// beyond wall.u_m crosses it after it has come through what the beam begins with. Where it
+/// Why it is right. What of the chain is within the beam lies ahead of where the beam begins, and
+/// leads from one side of the beam to the other, so every ray crosses it after it has come through
+/// what the beam begins with, and before any camera beyond what it crosses. Where it
 /// crosses an EdgePlane's edge it comes from behind, since all targets are there; a CurtainPlane
 /// holds whichever way it is crossed. Under that edge's plane the ray is stopped, and a camera
 /// under all of the planes sees none of the targets.

@@ -420,7 +420,16 @@ class Bounding {
     const auto line_slope = static_cast<float>(plane.line_slope);
     cell.rising = std::max(line_slope, 0.0F);
     cell.falling = std::min(line_slope, 0.0F) - std::abs(line_slope) * kSlopeRounding;
+    cell.low_rad = static_cast<float>(-greatest_angle_rad(fan, -plane.low_turn)) - kAngleRounding;
+    cell.high_rad = static_cast<float>(greatest_angle_rad(fan, plane.high_turn)) + kAngleRounding;
     return cell;
+  }
+
+  /// No less than the angle of a ray of the fan by its tangent, from terms of the series: the same
+  /// bits everywhere, other than those of a library. Rays have no other angles than the fan's.
+  static double greatest_angle_rad(const Fan& fan, double tangent) {
+    const double t = std::clamp(tangent, -fan.tan_half, fan.tan_half), cube = t * t * t;
+    return t - cube / 3 + (t > 0 ? cube * t * t / 5 : 0);
   }
 
   /// The first crossing from one on that is over a line. Most are not: many are passed at once,
@@ -465,8 +474,11 @@ class Bounding {
                       wall))
         return false;
       look.planes.clear();
-      for (const SkyPlane& plane : wall.planes) look.planes.push_back(in_cells(look, plane));
-      reached.raise(look.planes, ring_beyond(wall.u_m, 0));
+      for (const SkyPlane& plane : wall.planes) {
+        look.planes.push_back(in_cells(look, plane));
+        look.planes.back().first_ring = ring_beyond(plane.beyond_m, 0);
+      }
+      reached.raise(look.planes);
       return true;
     };
     // A wall is raised on the last ridge before a ring that rises above all before it, if there
@@ -538,7 +550,7 @@ class Bounding {
     find_targets(look.view, piece, look.crests, candidates, targets);
     if (targets.plane) {
       look.planes.assign(1, in_cells(look, *targets.plane));
-      look.reached().raise(look.planes, 0);
+      look.reached().raise(look.planes);
       if (!look.reached().is_open()) return look.reached().lower(look.bounds);
     }
     raise_walls(look, piece, targets, lane);

@@ -38,6 +38,7 @@ void open_piece(const FanView& view, const ExitPiece& piece, bool is_proper, Wed
   const double high_v_m = std::max(piece.a.v_m, piece.b.v_m);
   const double low_u_m = std::min(piece.a.u_m, piece.b.u_m);
   const double high_u_m = std::max(piece.a.u_m, piece.b.u_m);
+  beam.from = piece.a, beam.to = piece.b;
   if (is_proper) {
     wedge.low = opening_from(view, piece.a, 1, -1);
     wedge.high = opening_from(view, piece.b, -1, -1);

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "core/threads/for_each_target.h"
 
@@ -16,17 +17,27 @@ constexpr float kEverything = std::numeric_limits<float>::infinity();
 /// What the kernels read of cells.
 struct CellColumns {
   const float *near_inverse, *far_inverse, *forward, *low_x, *low_y, *high_x, *high_y;
+  const float *low_rad, *high_rad;
 };
 
+/// @param first_of_ring  [kRings + 1] cells
 SCARP_FOR_EACH_TARGET
 void raise_cells(const CellColumns& cells, const CellPlane* planes, std::size_t plane_count,
-                 std::size_t first, std::size_t end, float* least, float* best) {
+                 std::size_t first_ring, const std::uint32_t* first_of_ring, float* least,
+                 float* best) {
+  const std::size_t first = first_of_ring[first_ring], end = first_of_ring[kRings];
   for (std::size_t i = first; i < end; ++i) least[i] = kEverything;
   for (std::size_t p = 0; p < plane_count; ++p) {
     const CellPlane plane = planes[p];
+    const std::size_t beyond = first_of_ring[plane.first_ring];
+    for (std::size_t i = first; i < beyond; ++i) {
+      const bool is_passed =
+          (plane.high_rad < cells.low_rad[i]) | (plane.low_rad > cells.high_rad[i]);
+      least[i] = is_passed ? least[i] : kNothing;
+    }
     const float* inverse = plane.rise < 0 ? cells.near_inverse : cells.far_inverse;
     const float* line_inverse = plane.line_rise < 0 ? cells.near_inverse : cells.far_inverse;
-    for (std::size_t i = first; i < end; ++i) {
+    for (std::size_t i = beyond; i < end; ++i) {
       const float slope = plane.rise * inverse[i];
       const float at_low = plane.x * cells.low_x[i] + plane.y * cells.low_y[i];
       const float at_high = plane.x * cells.high_x[i] + plane.y * cells.high_y[i];
@@ -35,7 +46,10 @@ void raise_cells(const CellColumns& cells, const CellPlane* planes, std::size_t 
       const float along =
           plane.line_rise * line_inverse[i] + (plane.rising * cells.forward[i] + plane.falling);
       const float bound = in_cell < along ? along : in_cell;
-      least[i] = bound < least[i] ? bound : least[i];
+      const bool is_passed =
+          (plane.high_rad < cells.low_rad[i]) | (plane.low_rad > cells.high_rad[i]);
+      const float of_rays = is_passed ? kEverything : bound;
+      least[i] = of_rays < least[i] ? of_rays : least[i];
     }
   }
   for (std::size_t i = first; i < end; ++i) best[i] = best[i] < least[i] ? least[i] : best[i];
@@ -134,6 +148,15 @@ void Turns::turn_to(const PolarLayout& layout, const Fan& fan, const RingTable& 
     return sector_of(layout, std::cos(azimuth_rad), std::sin(azimuth_rad));
   };
   middle = sector_at(fan.middle_rad);
+  half_rad = fan.half_rad;
+  borders_rad.clear();
+  for (std::int32_t turn = -sectors / 2; turn <= sectors - sectors / 2; ++turn) {
+    const double about_rad = 2 * std::numbers::pi * turn / sectors;
+    const double border_rad = azimuth_at(layout, (middle + turn + sectors) % sectors);
+    // The same direction, on the way round from the middle.
+    borders_rad.push_back(static_cast<float>(
+        about_rad + std::remainder(border_rad - fan.middle_rad - about_rad, 2 * std::numbers::pi)));
+  }
   const auto from_middle = [&](std::int32_t sector) {
     return static_cast<std::int16_t>((sector - middle + sectors + sectors / 2) % sectors -
                                      sectors / 2);
@@ -161,9 +184,10 @@ void visit_marked(const std::uint64_t* marks, const CellRun& run, Visit visit) {
 
 void ReachedCells::make_room(std::size_t size) {
   if (cell_.size() >= size) return;
-  cell_.resize(size), turn_.resize(size), ring_.resize(size), taken_.resize(size);
-  for (auto* column : {&near_inverse_, &far_inverse_, &forward_, &low_x_, &low_y_, &high_x_,
-                       &high_y_, &best_, &wanted_, &least_})
+  cell_.resize(size), ring_.resize(size), taken_.resize(size);
+  for (auto* column :
+       {&near_inverse_, &far_inverse_, &forward_, &low_x_, &low_y_, &high_x_, &high_y_,
+        &low_border_rad_, &high_border_rad_, &low_rad_, &high_rad_, &best_, &wanted_, &least_})
     column->resize(size);
 }
 
@@ -186,6 +210,18 @@ void ReachedCells::mark(const Turns& turns, std::int32_t sectors, const Known& k
   }
 }
 
+std::array<ReachedCells::InRing, kRings> ReachedCells::in_rings() const {
+  std::array<InRing, kRings> in;
+  const RingRow& forward_row = forward();
+  // A camera's azimuth is that of the ray and the angle by which it passes the centre. Both are
+  // widened by kCellOverlap in the table of rings.
+  for (std::size_t k = 0; k < kRings; ++k)
+    in[k] = {forward_row[k],
+             static_cast<float>(rings_->turn_low[low_][k] + turns_->half_rad) - kAngleRounding,
+             static_cast<float>(rings_->turn_high[high_][k] - turns_->half_rad) + kAngleRounding};
+  return in;
+}
+
 void ReachedCells::reach(const RingTable& rings, const Turns& turns,
                          std::span<const SectorBorders> borders, std::size_t low, std::size_t high,
                          const Known& known) {
@@ -197,7 +233,8 @@ void ReachedCells::reach(const RingTable& rings, const Turns& turns,
   std::size_t most = 0;
   for (std::size_t r = 0; r < run_count(); ++r) most += runs_[r].count;
   make_room(most);
-  const RingRow& forward_row = forward();
+  const std::array<InRing, kRings> in = in_rings();
+  const float* borders_rad = turns.borders_rad.data() + sectors_ / 2;
   std::uint32_t wanted = 0;
   for (std::size_t k = 0; k < kRings; ++k) {
     first_[k] = wanted;
@@ -210,9 +247,12 @@ void ReachedCells::reach(const RingTable& rings, const Turns& turns,
         const std::size_t i = wanted++;
         const SectorBorders& border = borders[cell - k * borders.size()];
         cell_[i] = cell, ring_[i] = static_cast<std::uint16_t>(k);
-        turn_[i] = static_cast<std::int16_t>(turn + static_cast<std::int32_t>(cell - run.begin));
+        const float* border_rad = borders_rad + turn + static_cast<std::int32_t>(cell - run.begin);
+        low_border_rad_[i] = border_rad[0], high_border_rad_[i] = border_rad[1];
+        low_rad_[i] = border_rad[0] - in[k].most_rad;
+        high_rad_[i] = border_rad[1] - in[k].least_rad;
         near_inverse_[i] = rings.near_inverse[k], far_inverse_[i] = rings.far_inverse[k];
-        forward_[i] = forward_row[k];
+        forward_[i] = in[k].forward;
         low_x_[i] = border.low_x, low_y_[i] = border.low_y;
         high_x_[i] = border.high_x, high_y_[i] = border.high_y;
         best_[i] = kNothing;
@@ -230,17 +270,19 @@ void ReachedCells::reach_part(const ReachedCells& whole, std::size_t low, std::s
   rings_ = whole.rings_, turns_ = whole.turns_, low_ = low, high_ = high;
   sectors_ = whole.sectors_, hints_ = whole.hints_, ring_best_ = whole.ring_best_;
   has_runs_ = false;
-  const auto& first_turn = turns_->first[low];
-  const auto& last_turn = turns_->last[high];
-  const RingRow& forward_row = forward();
+  const std::array<InRing, kRings> in = in_rings();
+  const auto half_rad = static_cast<float>(turns_->half_rad) + kAngleRounding;
   // Without branches: which cells are left follows no pattern.
   std::array<std::uint32_t, kRings> in_ring{};
   std::size_t size = 0;
   for (std::size_t i = 0; i < whole.size(); ++i) {
     const std::size_t k = whole.ring_[i];
     taken_[size] = static_cast<std::uint32_t>(i);
-    const unsigned is_taken = static_cast<unsigned>(whole.turn_[i] >= first_turn[k]) &
-                              static_cast<unsigned>(whole.turn_[i] <= last_turn[k]) &
+    const float low_rad = whole.low_border_rad_[i] - in[k].most_rad;
+    const float high_rad = whole.high_border_rad_[i] - in[k].least_rad;
+    low_rad_[size] = low_rad, high_rad_[size] = high_rad;
+    const unsigned is_taken = static_cast<unsigned>(low_rad <= half_rad) &
+                              static_cast<unsigned>(high_rad >= -half_rad) &
                               static_cast<unsigned>(whole.best_[i] < whole.wanted_[i]);
     size += is_taken;
     in_ring[k] += is_taken;
@@ -248,9 +290,10 @@ void ReachedCells::reach_part(const ReachedCells& whole, std::size_t low, std::s
   for (std::size_t k = 0; k < kRings; ++k) first_[k + 1] = first_[k] + in_ring[k];
   for (std::size_t j = 0; j < size; ++j) {
     const std::size_t i = taken_[j], k = whole.ring_[i];
-    cell_[j] = whole.cell_[i], turn_[j] = whole.turn_[i], ring_[j] = whole.ring_[i];
+    cell_[j] = whole.cell_[i], ring_[j] = whole.ring_[i];
+    low_border_rad_[j] = whole.low_border_rad_[i], high_border_rad_[j] = whole.high_border_rad_[i];
     near_inverse_[j] = whole.near_inverse_[i], far_inverse_[j] = whole.far_inverse_[i];
-    forward_[j] = forward_row[k];
+    forward_[j] = in[k].forward;
     low_x_[j] = whole.low_x_[i], low_y_[j] = whole.low_y_[i];
     high_x_[j] = whole.high_x_[i], high_y_[j] = whole.high_y_[i];
     best_[j] = whole.best_[i], wanted_[j] = whole.wanted_[i];
@@ -258,12 +301,17 @@ void ReachedCells::reach_part(const ReachedCells& whole, std::size_t low, std::s
   open_end_ = size;
 }
 
-void ReachedCells::raise(std::span<const CellPlane> planes, std::size_t first) {
+void ReachedCells::raise(std::span<const CellPlane> planes) {
+  std::size_t first = kRings, beyond = 0;
+  for (const CellPlane& plane : planes) {
+    first = std::min(first, plane.first_ring);
+    beyond = std::max(beyond, plane.first_ring);
+  }
   if (first >= kRings) return;
   raise_cells({near_inverse_.data(), far_inverse_.data(), forward_.data(), low_x_.data(),
-               low_y_.data(), high_x_.data(), high_y_.data()},
-              planes.data(), planes.size(), first_[first], size(), least_.data(), best_.data());
-  raise_rings(*rings_, forward(), planes.data(), planes.size(), first, ring_least_.data(),
+               low_y_.data(), high_x_.data(), high_y_.data(), low_rad_.data(), high_rad_.data()},
+              planes.data(), planes.size(), first, first_.data(), least_.data(), best_.data());
+  raise_rings(*rings_, forward(), planes.data(), planes.size(), beyond, ring_least_.data(),
               ring_best_.data());
 }
 

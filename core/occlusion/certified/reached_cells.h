@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -38,6 +39,9 @@ std::vector<SectorBorders> borders_of(const PolarLayout& layout);
 struct Turns {
   std::int32_t middle = 0;
   std::array<std::array<std::int16_t, kRings>, kLanes> first, last;
+  double half_rad = 0;             ///< of the fan
+  std::vector<float> borders_rad;  ///< [sectors + 1] where sectors begin, from the fan's middle;
+                                   ///< the first is sectors / 2 before `middle`
 
   void turn_to(const PolarLayout& layout, const Fan& fan, const RingTable& rings);
 };
@@ -49,7 +53,14 @@ struct CellPlane {
   float slope_error;
   float line_rise;        ///< of the lowest line that rays see, at u of the centre
   float rising, falling;  ///< its slope where it rises and where it falls
+  /// Only rays between these angles from the fan's middle come through it.
+  float low_rad = -std::numeric_limits<float>::infinity();
+  float high_rad = std::numeric_limits<float>::infinity();
+  std::size_t first_ring = 0;  ///< from which on cameras are beyond it
 };
+
+/// Allowance for the rounding of angles in float, radians: four roundings of angles below 8.
+inline constexpr float kAngleRounding = 0x1p-20F;
 
 /// Relative allowance for the rounding of a slope in float: about ten operations of 2^-24 each.
 inline constexpr float kSlopeRounding = 0x1p-19F;
@@ -81,8 +92,10 @@ class ReachedCells {
   /// Those of a piece's cells that are open, as far as rays over a part of it lead to them.
   void reach_part(const ReachedCells& whole, std::size_t low, std::size_t high);
 
-  /// Raises what is known of rings from `first` on to the lowest of some planes.
-  void raise(std::span<const CellPlane> planes, std::size_t first);
+  /// Raises what is known of each cell to the lowest of those planes that rays over the piece come
+  /// through to it, of all planes in cells of no use; where cameras are not beyond one of them,
+  /// nothing. Some plane is come through by every ray.
+  void raise(std::span<const CellPlane> planes);
 
   /// One past the last ring with a bound that is short of what is of use; 0 where there is none.
   /// Cost: O(1) over all calls for each cell, because bounds only rise.
@@ -104,15 +117,21 @@ class ReachedCells {
   void find_runs();
   /// The outer of the lanes has the least reach.
   const RingRow& forward() const { return rings_->forward[high_ + low_ >= kLanes ? high_ : low_]; }
+  /// What the cells of a ring have in common for the lanes.
+  struct InRing {
+    float forward, least_rad, most_rad;  // angles by which cameras pass the centre
+  };
+  std::array<InRing, kRings> in_rings() const;
 
   std::array<std::uint32_t, kRings + 1> first_{};  // of each ring
   std::vector<std::uint32_t> cell_;                // in the group's bounds
-  std::vector<std::int16_t> turn_;
   std::vector<std::uint16_t> ring_;
   std::vector<std::uint32_t> taken_;  // of the whole, for a part
   std::size_t open_end_ = 0;          // no cell from here on is open
   std::vector<float> near_inverse_, far_inverse_, forward_;
-  std::vector<float> low_x_, low_y_, high_x_, high_y_;  // SectorBorders
+  std::vector<float> low_x_, low_y_, high_x_, high_y_;   // SectorBorders
+  std::vector<float> low_border_rad_, high_border_rad_;  // of the sector, from the fan's middle
+  std::vector<float> low_rad_, high_rad_;                // of rays that lead to the cell
   std::vector<float> best_, wanted_, least_;
 
   // The lanes, and bounds for whole rings of them.

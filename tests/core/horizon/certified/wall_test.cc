@@ -65,7 +65,9 @@ struct Scene {
     const double nu = (high.v_m - low.v_m) / length_m, nv = -(high.u_m - low.u_m) / length_m;
     beam = {{-low.v_m - low.u_m * tan_half, tan_half, 1},
             {high.v_m - high.u_m * tan_half, tan_half, -1},
-            {-nu * low.u_m - nv * low.v_m, nu, nv}};
+            {-nu * low.u_m - nv * low.v_m, nu, nv},
+            low,
+            high};
   }
 
   /// A place between the targets, and one on the piece that a ray from it can cross.
@@ -97,10 +99,17 @@ struct Scene {
   }
 };
 
+/// Where cameras are beyond all edges of a wall.
+double beyond_m(const std::vector<SkyPlane>& planes) {
+  double most_m = -HUGE_VAL;
+  for (const SkyPlane& plane : planes) most_m = std::max(most_m, plane.beyond_m);
+  return most_m;
+}
+
 /// Height at a place beyond the wall that is under all of its planes, or under all of its lines.
-double under_m(const Wall& wall, const FanPlace& place, bool lines) {
+double under_m(const std::vector<SkyPlane>& planes, const FanPlace& place, bool lines) {
   double least_m = HUGE_VAL;
-  for (const SkyPlane& plane : wall.planes)
+  for (const SkyPlane& plane : planes)
     least_m = std::min(least_m, lines ? plane.line_m + plane.line_slope * place.u_m
                                       : plane.height_m + plane.ahead * (place.u_m - plane.u_m) +
                                             plane.left * (place.v_m - plane.v_m));
@@ -124,12 +133,12 @@ TEST(Wall, HidesAllTargetsFromBeyondUnderItsPlanes) {
         const auto ray = scene.ray(random);
         if (!ray) continue;
         const auto& [from, over] = *ray;
-        const double beyond_m =
-            wall.u_m + std::ldexp(random.unit(), static_cast<int>(random.below(12)) - 4);
-        const double share = (beyond_m - from.u_m) / (over.u_m - from.u_m);
+        const double u_m = beyond_m(wall.planes) +
+                           std::ldexp(random.unit(), static_cast<int>(random.below(12)) - 4);
+        const double share = (u_m - from.u_m) / (over.u_m - from.u_m);
         for (const bool lines : {false, true}) {
           FanPlace camera = between(from, over, share);
-          camera.z_m = under_m(wall, camera, lines);
+          camera.z_m = under_m(wall.planes, camera, lines);
           EXPECT_TRUE(is_blocked(scene.tin, scene.view, from, camera)) << "seed " << seed;
           ++rays;
         }
@@ -139,6 +148,41 @@ TEST(Wall, HidesAllTargetsFromBeyondUnderItsPlanes) {
   EXPECT_GT(walls, 1'000U);
   EXPECT_GT(chains, 300U);
   EXPECT_GT(rays, 5'000U);
+}
+
+TEST(Wall, HidesAllTargetsBeyondThePlanesThatARayCanComeThrough) {
+  std::size_t parts = 0, nearer = 0;
+  for (std::uint64_t seed = 0; seed < 1000 && !HasFailure(); ++seed) {
+    SplitMix64 random(seed);
+    const Scene scene(random);
+    const RidgeEdges ridges = ridge_edges_of(scene.tin);
+    Wall wall;
+    for (std::uint32_t edge = 0; edge < ridges.edges.size(); ++edge) {
+      const double slope = 4 * random.unit() - 2;
+      if (!raise_wall(ridges, scene.view, scene.beam, Places(scene.targets), edge, slope, wall))
+        continue;
+      for (int i = 0; i < 8; ++i) {
+        const auto ray = scene.ray(random);
+        if (!ray) continue;
+        const auto& [from, over] = *ray;
+        const double turn = (over.v_m - from.v_m) / (over.u_m - from.u_m);
+        std::vector<SkyPlane> met;
+        for (const SkyPlane& plane : wall.planes)
+          if (turn >= plane.low_turn && turn <= plane.high_turn) met.push_back(plane);
+        ASSERT_FALSE(met.empty()) << "seed " << seed;
+        parts += met.size() < wall.planes.size();
+        nearer += beyond_m(met) < beyond_m(wall.planes);
+        const double u_m = beyond_m(met) + std::ldexp(random.unit(), -4);
+        for (const bool lines : {false, true}) {
+          FanPlace camera = between(from, over, (u_m - from.u_m) / (over.u_m - from.u_m));
+          camera.z_m = under_m(met, camera, lines);
+          EXPECT_TRUE(is_blocked(scene.tin, scene.view, from, camera)) << "seed " << seed;
+        }
+      }
+    }
+  }
+  EXPECT_GT(parts, 500U);
+  EXPECT_GT(nearer, 100U);
 }
 
 }  // namespace
