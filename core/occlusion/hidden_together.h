@@ -15,8 +15,8 @@ struct HiddenTogetherOptions {
   std::uint32_t eyes = 512;                ///< sampled; a multiple of 64
   /// Price of reaching far. In a disc of the plan area that is usual for a group there, distance
   /// costs a triangle as much as being seen from compactness / (2 pi) of the eyes. Least is lost to
-  /// eyes at about 0.1, but regions of far-reaching groups are coarse, of either method.
-  double compactness = 4;
+  /// eyes at 0.1 and less, but regions of far-reaching groups are coarse, of either method.
+  double compactness = 0.3;
 };
 
 /// Triangles in groups that are likely to be hidden together, all of them.
