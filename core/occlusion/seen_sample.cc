@@ -10,8 +10,9 @@
 namespace scarp {
 namespace {
 
-/// Finer nodes find little more: with four, groups cull 1 % more for twice the time.
-constexpr double kNodesPerTriangle = 1;
+/// With one, a third less time goes into growth, and groups that hide together have less in them:
+/// by 0.3 % on mountains, by 4 % in streets.
+constexpr double kNodesPerTriangle = 4;
 
 /// Share of one corner in the places that stand for a triangle's corners, and of the other two.
 constexpr double kNearCorner = 0.8;

@@ -32,7 +32,8 @@ inline constexpr std::array<double, 4> kSampledHeightsM = {2, 50, 300, 1000};
 /// Side: none. For choosing groups, never for culling.
 /// Requires (asserted): eyes a multiple of 64 and not 0.
 /// Same bits for any thread count and on every machine.
-/// Cost: O(eyes * triangles), about 10 ns of each; eyes / 8 bytes a triangle.
+/// Cost: O(eyes * triangles), about 20 ns of each; eyes / 8 bytes a triangle, and about 60 for each
+/// thread meanwhile.
 SeenSample sample_sight(const Tin& tin, std::uint64_t seed, std::uint32_t eyes);
 
 }  // namespace scarp
