@@ -1,7 +1,8 @@
 // What certified regions cull of what can be culled, what they cost, and how fast they answer.
 //   certified_bench [--dem NAME[,NAME]] [--vertices N | --built] [--groups N] [--eyes N]
-//                   [--group-triangles N] [--compactness X] [--fans N[,N]] [--sectors N]
-//                   [--bytes N[,N]] [--patch X] [--threads N] [--json] [--markdown] [--front SVG]
+//                   [--whole N] [--group-triangles N] [--compactness X] [--fans N[,N]]
+//                   [--sectors N] [--bytes N[,N]] [--patch X] [--threads N] [--json] [--markdown]
+//                   [--front SVG]
 //   certified_bench --scale [--triangles N[,N]] [...]
 // On every listed DEM groups are grown hidden together, as by the product, and squares of a
 // quadtree are made with the same mean size; both are certified with the same settings. The exact
@@ -13,9 +14,11 @@
 // --built takes the meshes that users get, as `scarp build` makes them unless told otherwise, to a
 // tenth of a cell (of rasters of more than 1500 samples a side the middle). With --groups so many
 // groups, drawn by their triangles, stand for all: a fair sample, because groups do not depend on
-// each other. scripts/bench built is --built --groups 100 --eyes 4. At last the time that one
-// camera takes with 10,000 groups: those of the last DEM, laid side by side, and cameras that fly
-// over them; memory that was asked for meanwhile is counted.
+// each other; but meshes of at most --whole triangles are judged whole, from three times the eyes.
+// scripts/bench built is --built --groups 100 --eyes 4 --whole 80000. `ratio` is what crystals cull
+// over what squares do, of the same hidden triangles, with its standard error where groups were
+// drawn. At last the time that one camera takes with 10,000 groups: those of the last DEM, laid
+// side by side, and cameras that fly over them; memory that was asked for meanwhile is counted.
 // --markdown leaves out the DEMs' rows: what one setting comes to beside what is wanted of it.
 // --front tries several numbers of fans and of bytes, crystals only, and draws what they come to.
 // --scale measures how cost grows with the mesh, on one large DEM, and tells the bits of the
@@ -98,7 +101,7 @@ struct Measured {
 Measured measure(const test::ListedDem& listed, const Tin& tin, const Settings& settings) {
   Partition crystals = test::crystals_of(tin, settings.question);
   Partition squares = test::squares_like(tin, crystals, settings.question);
-  const auto eyes = test::judge_eyes(tin, {&crystals, &squares}, settings.question.eyes);
+  const auto eyes = test::judge_eyes(tin, {&crystals, &squares}, eyes_for(tin, settings.question));
   const auto triangles = static_cast<double>(tin.triangles.size());
   nlohmann::json row = {{"dem", listed.name},
                         {"triangles", tin.triangles.size()},
@@ -108,6 +111,10 @@ Measured measure(const test::ListedDem& listed, const Tin& tin, const Settings& 
     test::count_eyes(eyes, *part);
     row[part->name] = row_of(tin, *part);
   }
+  if (const auto advantage = test::advantage_of(crystals, squares))
+    row["over_squares"] = {{"culled", advantage->culled},
+                           {"culled_error", advantage->error},
+                           {"in_hidden_groups", advantage->in_hidden}};
   return {row, std::move(crystals.regions)};
 }
 
@@ -123,6 +130,15 @@ double of_hidden(const nlohmann::json& part) {
   return hidden > 0 ? culled / hidden : 0;
 }
 
+/// Culled by crystals over culled by squares, and how much that is worth.
+std::string ratio_of(const nlohmann::json& row) {
+  if (!row.contains("over_squares")) return "–";
+  const nlohmann::json& over = row["over_squares"];
+  const auto error = over["culled_error"].get<double>();
+  return fmt::format("{:.3f}", over["culled"].get<double>()) +
+         (error > 0 ? fmt::format(" ± {:.3f}", error) : "");
+}
+
 /// Crystals and, after a stroke, squares.
 void print_row(const nlohmann::json& row) {
   const nlohmann::json &crystals = row["crystals"], &squares = row["squares"];
@@ -136,12 +152,12 @@ void print_row(const nlohmann::json& row) {
     else
       text += "| – ";
   }
-  fmt::print("{}| {:.3f} / {:.3f} | {} | {:.1f} | {:.1f} | {:.0f} | {:.0f} | {:g} |\n", text,
-             of_hidden(crystals), of_hidden(squares), crystals["median_group"].get<int>(),
-             100 * crystals["orphans"].get<double>(), crystals["bytes_per_triangle"].get<double>(),
-             crystals["certify_us_per_triangle"].get<double>(),
-             row["grow_us_per_triangle"].get<double>(),
-             crystals["false_culls"].get<double>() + squares["false_culls"].get<double>());
+  fmt::print(
+      "{}| {:.3f} / {:.3f} | {} | {} | {:.1f} | {:.1f} | {:.0f} | {:.0f} | {:g} |\n", text,
+      of_hidden(crystals), of_hidden(squares), ratio_of(row), crystals["median_group"].get<int>(),
+      100 * crystals["orphans"].get<double>(), crystals["bytes_per_triangle"].get<double>(),
+      crystals["certify_us_per_triangle"].get<double>(), row["grow_us_per_triangle"].get<double>(),
+      crystals["false_culls"].get<double>() + squares["false_culls"].get<double>());
   std::fflush(stdout);
 }
 
@@ -165,21 +181,14 @@ nlohmann::json means(const nlohmann::json& rows, const char* part, const char* f
   return all;
 }
 
-/// Culled by crystals over culled by squares, of all heights of a DEM that count together: where
-/// squares cull next to nothing a ratio for each height would say nothing.
-nlohmann::json against_squares(const nlohmann::json& rows) {
+/// Crystals over squares, a figure of test::Advantage, over the DEMs.
+nlohmann::json against_squares(const nlohmann::json& rows, const char* figure) {
   double sum = 0, worst = 0;
   int dems = 0;
   std::string worst_dem;
   for (const auto& row : rows) {
-    double crystals = 0, squares = 0;
-    for (std::size_t h = 0; h < kHeights; ++h) {
-      if (!row["crystals"]["heights"][h]["counts"].get<bool>()) continue;
-      crystals += row["crystals"]["heights"][h]["culled"].get<double>();
-      squares += row["squares"]["heights"][h]["culled"].get<double>();
-    }
-    if (squares == 0) continue;
-    const double ratio = crystals / squares;
+    if (!row.contains("over_squares")) continue;
+    const auto ratio = row["over_squares"][figure].get<double>();
     if (dems == 0 || ratio < worst) worst = ratio, worst_dem = row["dem"].get<std::string>();
     sum += ratio;
     ++dems;
@@ -211,7 +220,8 @@ nlohmann::json summary_of(const nlohmann::json& rows) {
     summary[part]["most_certify_us_per_triangle"] = most_us;
     summary[part]["mean_certify_us_per_triangle"] = user_us / static_cast<double>(rows.size());
   }
-  summary["culled_crystals_over_squares"] = against_squares(rows);
+  summary["culled_crystals_over_squares"] = against_squares(rows, "culled");
+  summary["in_hidden_groups_crystals_over_squares"] = against_squares(rows, "in_hidden_groups");
   return summary;
 }
 
@@ -256,6 +266,10 @@ void print_one_setting(const nlohmann::json& summary, const nlohmann::json& runt
     line("the same, worst", "1",
          fmt::format("{:.2f} ({})", ratio["worst"].get<double>(),
                      ratio["worst_dem"].get<std::string>()));
+    const nlohmann::json& hidden = summary["in_hidden_groups_crystals_over_squares"];
+    line("triangles in truly hidden groups, crystals over squares, mean and worst", "",
+         fmt::format("{:.2f}, {:.2f} ({})", hidden["mean"].get<double>(),
+                     hidden["worst"].get<double>(), hidden["worst_dem"].get<std::string>()));
   }
   line("orphans of the triangles, most", fmt::format("{:.0f} %", 100 * test::kMostOrphans),
        fmt::format("{:.1f} %", 100 * crystals["most_orphans"].get<double>()));
@@ -330,9 +344,9 @@ int run_dems(const Settings& settings) {
   const bool with_rows = !settings.json && !settings.markdown;
   if (with_rows)
     fmt::print(
-        "| DEM | triangles | 2 m | 50 m | 300 m | 1000 m | of all hidden | median group | orphans, "
-        "% | bytes | certify, us | grow, us | false culls |\n"
-        "|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+        "| DEM | triangles | 2 m | 50 m | 300 m | 1000 m | of all hidden | ratio | median group | "
+        "orphans, % | bytes | certify, us | grow, us | false culls |\n"
+        "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (const test::ListedDem& listed : test::kListedDems) {
     if (!test::is_asked_for(listed, settings.dems)) continue;
     const auto tin = mesh(listed, settings);
@@ -390,7 +404,7 @@ int run_settings(const Settings& settings) {
     if (!tin) continue;
     names += (names.empty() ? "" : ", ") + std::string(listed.name);
     Partition crystals = test::crystals_of(*tin, settings.question);
-    const auto eyes = test::judge_eyes(*tin, {&crystals}, settings.question.eyes);
+    const auto eyes = test::judge_eyes(*tin, {&crystals}, eyes_for(*tin, settings.question));
     for (Trial& trial : trials) {
       test::certify(*tin, trial.question, crystals);
       test::count_eyes(eyes, crystals);
@@ -498,6 +512,8 @@ bool take_value(Settings& settings, const std::string& name, const char* value) 
     question.groups = static_cast<std::uint32_t>(whole(1));
   } else if (name == "--eyes") {
     question.eyes = whole(1);
+  } else if (name == "--whole") {
+    question.whole_triangles = static_cast<std::uint32_t>(whole(0));
   } else if (name == "--group-triangles") {
     question.group_triangles = static_cast<std::uint32_t>(whole(2));
   } else if (name == "--compactness") {
@@ -562,7 +578,8 @@ int main(int argc, char** argv) {
     } else {
       fmt::print(stderr,
                  "usage: certified_bench [--dem NAME[,NAME]] [--vertices N | --built] [--groups N] "
-                 "[--eyes N] [--group-triangles N] [--compactness X] [--fans N[,N]] [--sectors N] "
+                 "[--eyes N] [--whole N] [--group-triangles N] [--compactness X] [--fans N[,N]] "
+                 "[--sectors N] "
                  "[--bytes N[,N]] [--patch X] [--threads N] [--scale [--triangles N[,N]]] "
                  "[--front SVG] [--markdown] [--json]\n");
       return 2;

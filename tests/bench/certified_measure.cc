@@ -45,6 +45,7 @@ void draw(std::uint32_t count, Partition& part) {
     part.groups.count = 0;
     for (std::uint32_t i = 0; i < count; ++i) {
       const std::size_t t = random.below(group_of.size());
+      part.drawn.push_back(static_cast<TriangleIndex>(t));
       const GroupIndex g = group_of[t];
       if (g == kNone)
         ++part.weight[t];
@@ -60,6 +61,19 @@ void draw(std::uint32_t count, Partition& part) {
   }
   std::sort(sizes.begin(), sizes.end());
   part.median_group = sizes[sizes.size() / 2];
+}
+
+bool is_whole(const Tin& tin, const CertifiedQuestion& question) {
+  return tin.triangles.size() <= question.whole_triangles;
+}
+
+std::uint32_t groups_of(const Tin& tin, const CertifiedQuestion& question) {
+  return is_whole(tin, question) ? UINT32_MAX : question.groups;
+}
+
+/// Whether a height counts for a partition.
+bool counts_at(const SeenCounts& counts) {
+  return counts.in_hidden >= kLeastInHiddenGroups * counts.triangles;
 }
 
 /// Whether bounds hide a group, before they are coded.
@@ -143,7 +157,7 @@ Partition crystals_of(const Tin& tin, const CertifiedQuestion& question) {
   const double begun_s = user_seconds();
   part.groups = grow_hidden_together(tin, together);
   part.grow_user_s = user_seconds() - begun_s;
-  draw(question.groups, part);
+  draw(groups_of(tin, question), part);
   return part;
 }
 
@@ -153,7 +167,7 @@ Partition squares_like(const Tin& tin, const Partition& crystals,
   part.name = "squares";
   part.groups =
       group_by_squares(tin, static_cast<std::uint32_t>(tin.triangles.size() / crystals.all_groups));
-  draw(question.groups, part);
+  draw(groups_of(tin, question), part);
   return part;
 }
 
@@ -199,8 +213,13 @@ std::vector<JudgedEye> judge_eyes(const Tin& tin, const std::vector<const Partit
   return all;
 }
 
+int eyes_for(const Tin& tin, const CertifiedQuestion& question) {
+  return question.eyes * (is_whole(tin, question) ? kEyesOfWhole : 1);
+}
+
 void count_eyes(const std::vector<JudgedEye>& eyes, Partition& part) {
   part.counts = {};
+  for (auto& culled_eyes : part.culled_eyes) culled_eyes.assign(part.groups.count, 0);
   const auto& group_of = part.groups.group_of_triangle;
   for (const JudgedEye& look : eyes) {
     std::vector<std::uint8_t> seen(part.groups.count, 0), culled(part.groups.count),
@@ -210,6 +229,7 @@ void count_eyes(const std::vector<JudgedEye>& eyes, Partition& part) {
     for (GroupIndex g = 0; g < part.groups.count; ++g) {
       culled[g] = hides_group(part.regions, g, look.eye);
       bound[g] = is_under(part.bounds, g, look.eye);
+      part.culled_eyes[look.height][g] += culled[g];
     }
     SeenCounts& counts = part.counts[look.height];
     for (std::size_t t = 0; t < group_of.size(); ++t) {
@@ -225,6 +245,33 @@ void count_eyes(const std::vector<JudgedEye>& eyes, Partition& part) {
       counts.falsely += (is_culled || is_bound) && look.is_visible[t];
     }
   }
+}
+
+std::optional<Advantage> advantage_of(const Partition& part, const Partition& over) {
+  double culled = 0, culled_over = 0, hidden = 0, hidden_over = 0;
+  for (std::size_t h = 0; h < part.counts.size(); ++h) {
+    if (!counts_at(part.counts[h])) continue;
+    culled += part.counts[h].culled, culled_over += over.counts[h].culled;
+    hidden += part.counts[h].in_hidden, hidden_over += over.counts[h].in_hidden;
+  }
+  if (!(culled_over > 0)) return {};
+  Advantage advantage{culled / culled_over, hidden / hidden_over, 0};
+  const auto of_draw = [&](const Partition& p, TriangleIndex t) {
+    double eyes = 0;
+    for (std::size_t h = 0; h < part.counts.size(); ++h)
+      if (counts_at(part.counts[h]) && p.groups.group_of_triangle[t] != kNone)
+        eyes += p.culled_eyes[h][p.groups.group_of_triangle[t]];
+    return eyes;
+  };
+  // Of a ratio of sums over the same draws (Cochran 1977, 2.11).
+  double squares = 0;
+  for (const TriangleIndex t : part.drawn) {
+    const double off = of_draw(part, t) - advantage.culled * of_draw(over, t);
+    squares += off * off;
+  }
+  const auto draws = static_cast<double>(part.drawn.size());
+  if (draws > 1) advantage.error = std::sqrt(squares * draws / (draws - 1)) / culled_over;
+  return advantage;
 }
 
 nlohmann::json row_of(const Tin& tin, const Partition& part) {
@@ -251,7 +298,7 @@ nlohmann::json row_of(const Tin& tin, const Partition& part) {
                               {"share", ratio(c.culled, c.in_hidden)},
                               {"raw", ratio(c.bound, c.in_hidden)},
                               {"of_hidden", ratio(c.culled, c.hidden)},
-                              {"counts", c.in_hidden >= kLeastInHiddenGroups * c.triangles}});
+                              {"counts", counts_at(c)}});
   }
   row["false_culls"] = false_culls;
   return row;

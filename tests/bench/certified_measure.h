@@ -32,7 +32,11 @@ struct CertifiedQuestion {
   /// there are no more: a fair sample, because groups do not depend on each other. Partitions of
   /// one mesh are drawn from at the same places, so that they can be compared.
   std::uint32_t groups = UINT32_MAX;
+  /// Meshes of at most so many triangles are judged whole all the same, and from kEyesOfWhole times
+  /// the eyes: a DEM counts as much as any other, and of a small one a hundred groups say little.
+  std::uint32_t whole_triangles = 0;
 };
+inline constexpr int kEyesOfWhole = 3;
 
 /// Triangles over all eyes of a height. A triangle of a sample stands for as many as its weight.
 struct SeenCounts {
@@ -49,11 +53,14 @@ struct Partition {
   double grow_user_s = 0;
   /// [triangles] 1 where all groups are drawn; of a sample each draw is shared out to its group.
   std::vector<float> weight;
+  std::vector<TriangleIndex> drawn;  ///< in turn; none where all groups are judged
   HidingBounds bounds;
   CertifiedRegions regions;
   double certify_user_s = 0, certify_wall_s = 0;  ///< of all groups; predicted from a sample
   double bytes_per_triangle = 0;                  ///< of all groups
   std::array<SeenCounts, kEyeHeightsM.size()> counts{};
+  /// [heights][groups] from how many eyes a group is culled
+  std::array<std::vector<std::uint32_t>, kEyeHeightsM.size()> culled_eyes;
 };
 
 /// Groups that are hidden together, as by the product.
@@ -68,6 +75,9 @@ Partition squares_like(const Tin& tin, const Partition& crystals,
 /// mesh costs once, and what each group does.
 void certify(const Tin& tin, const CertifiedQuestion& question, Partition& part);
 
+/// Eyes at each height for a mesh.
+int eyes_for(const Tin& tin, const CertifiedQuestion& question);
+
 /// What the exact judge sees of some partitions from seeded eyes, the same for all of them.
 struct JudgedEye {
   std::size_t height;  ///< index into kEyeHeightsM
@@ -79,6 +89,18 @@ std::vector<JudgedEye> judge_eyes(const Tin& tin, const std::vector<const Partit
 
 /// Counts anew what a certified partition culls from the eyes.
 void count_eyes(const std::vector<JudgedEye>& eyes, Partition& part);
+
+/// What one partition culls over what another does, of the same triangles, at the heights where the
+/// first has something to cull, taken together.
+struct Advantage {
+  double culled = 0;     ///< triangles culled / triangles culled
+  double in_hidden = 0;  ///< the same of triangles in truly hidden groups: what regions could reach
+  double error = 0;      ///< standard error of `culled` that the draw of groups makes
+};
+
+/// Requires both drawn at the same places and counted from the same eyes.
+/// @return nothing where the other one culls nothing
+std::optional<Advantage> advantage_of(const Partition& part, const Partition& over);
 
 /// A partition's figures in words.
 nlohmann::json row_of(const Tin& tin, const Partition& part);
