@@ -158,13 +158,18 @@ TEST(HiddenTogether, SameSeedSameGroupsForAnyThreadCountOtherSeedOthers) {
             grow_hidden_together(rolling(), options).group_of_triangle);
 }
 
-/// The reason for all of it, on ground that growth has not seen from these eyes.
-TEST(HiddenTogether, HideMoreThanSquares) {
+/// The reason for all of it, on ground that growth has not seen from these eyes. Groups that may
+/// reach a little farther for what is hidden with them hide more than compact ones.
+TEST(HiddenTogether, HideMoreThanSquaresAndThanCompactGroups) {
   const LeafGroups groups = grow_hidden_together(rolling(), small_groups());
   const auto mean = static_cast<std::uint32_t>(rolling().triangles.size() / groups.count);
   const LeafGroups squares = group_by_squares(rolling(), mean);
   ASSERT_GE(squares.count, groups.count);
-  EXPECT_GT(hidden_share(rolling(), groups), 1.05 * hidden_share(rolling(), squares));
+  HiddenTogetherOptions compact = small_groups();
+  compact.compactness = 4;
+  const double hidden = hidden_share(rolling(), groups);
+  EXPECT_GT(hidden, 1.1 * hidden_share(rolling(), squares));
+  EXPECT_GT(hidden, 1.02 * hidden_share(rolling(), grow_hidden_together(rolling(), compact)));
 }
 
 TEST(HiddenTogether, CompactGroupsReachLessFar) {
