@@ -4,10 +4,10 @@
 
 #include <algorithm>
 
-#include "cli/build/certified_settings.h"
 #include "core/culling/certified_culling.h"
 #include "core/culling/visible_groups.h"
 #include "core/error/error.h"
+#include "tiles/store/groups_file.h"
 
 namespace scarp {
 namespace {
@@ -51,7 +51,7 @@ std::vector<std::unique_ptr<CullingMethod>> culling_methods(const Groups& groups
 }
 
 std::size_t region_bytes(const Groups& groups, const std::string& method) {
-  if (method == "certified") return certified_bytes(groups.certified);
+  if (method == "certified") return kept_bytes(groups.certified);
   const Regions& regions = groups.regions;
   return regions.first.size() * sizeof(std::uint32_t) +
          regions.points.size() * sizeof(RegionPoint) + regions.end_slope.size() * sizeof(double);

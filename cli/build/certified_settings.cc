@@ -11,15 +11,9 @@ HidingOptions hiding_options(const CertifiedSettings& settings) {
   return options;
 }
 
-std::size_t certified_bytes(const CertifiedRegions& regions) {
-  return regions.groups.size() * sizeof(CertifiedGroup) +
-         regions.steps.size() * sizeof(SectorSteps);
-}
-
 double least_bytes(std::uint32_t groups) {
   constexpr int kFewestSectors = 8;
-  return static_cast<double>(groups) *
-         static_cast<double>(sizeof(CertifiedGroup) + kFewestSectors * sizeof(SectorSteps));
+  return static_cast<double>(groups) * kept_group_bytes(kFewestSectors);
 }
 
 }  // namespace scarp

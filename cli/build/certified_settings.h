@@ -34,7 +34,4 @@ HidingOptions hiding_options(const CertifiedSettings& settings);
 /// The least that regions of so many groups can take, bytes.
 double least_bytes(std::uint32_t groups);
 
-/// What regions take in memory and on disk.
-std::size_t certified_bytes(const CertifiedRegions& regions);
-
 }  // namespace scarp

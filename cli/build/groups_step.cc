@@ -124,7 +124,7 @@ void certify(StepRun& run, Tin own, Groups& groups) {
   run.facts["certified"] = {{"sectors", settings.sectors},
                             {"fans", settings.fans},
                             {"patch", settings.patch},
-                            {"bytes", certified_bytes(groups.certified)}};
+                            {"bytes", kept_bytes(groups.certified)}};
 }
 
 /// The groups of a tile's own samples, for the layer of the whole raster.

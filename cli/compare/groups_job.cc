@@ -21,6 +21,7 @@
 #include "core/occlusion/group_tree.h"
 #include "core/occlusion/squares.h"
 #include "core/threads/parallel_for.h"
+#include "tiles/store/groups_file.h"
 
 namespace scarp {
 namespace {
@@ -265,7 +266,7 @@ class GroupsComparison {
       ThesisCulling culling(groups);
       count(setting, groups, culling);
     } else {
-      setting.bytes_per_triangle = bytes_a_triangle(certified_bytes(groups.certified));
+      setting.bytes_per_triangle = bytes_a_triangle(kept_bytes(groups.certified));
       CertifiedCulling culling(groups.certified);
       count(setting, groups, culling);
     }

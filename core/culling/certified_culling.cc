@@ -5,6 +5,9 @@
 #include <cassert>
 #include <cmath>
 #include <numbers>
+#include <utility>
+
+#include "core/threads/for_each_target.h"
 
 namespace scarp {
 namespace {
@@ -56,7 +59,7 @@ class ViewWedge {
 struct Block {
   std::size_t count = 0;
   std::array<GroupIndex, kBlock> group;
-  std::array<float, kBlock> x_m, y_m, rise_m, distance_m;
+  std::array<float, kBlock> x_m{}, y_m{}, radius_m{}, rise_m, distance_m;
   std::array<std::int32_t, kBlock> ring, sector;
 };
 
@@ -74,23 +77,32 @@ std::size_t fill(const CertifiedRegions& regions, const ViewWedge* wedge, const 
   return next;
 }
 
+/// Rings and sectors of a camera by where it is from the groups of a block.
+SCARP_FOR_EACH_TARGET
+void find_cells(const PolarLayout layout, const float* x_m, const float* y_m, const float* radius_m,
+                std::int32_t* ring, std::int32_t* sector) {
+  for (std::size_t i = 0; i < kBlock; ++i) {
+    const float square_m2 = x_m[i] * x_m[i] + y_m[i] * y_m[i];
+    const float ring_square = square_m2 / (radius_m[i] * radius_m[i]);
+    // Within the circle there is no ring, and perhaps no direction.
+    const bool is_near = !(ring_square >= 1);
+    const std::int32_t of_ring = ring_of(layout, is_near ? 1.0F : ring_square);
+    ring[i] = is_near ? -1 : of_ring;
+    sector[i] = sector_of(layout, is_near ? 1.0F : x_m[i], is_near ? 1.0F : y_m[i]);
+  }
+}
+
 void place_camera(const CertifiedRegions& regions, const Position& eye, Block& block) {
-  std::array<float, kBlock> ring_square;
   for (std::size_t i = 0; i < block.count; ++i) {
     const CertifiedGroup& g = regions.groups[block.group[i]];
     block.x_m[i] = static_cast<float>(eye.x_m - g.centre_x_m);
     block.y_m[i] = static_cast<float>(eye.y_m - g.centre_y_m);
     block.rise_m[i] = static_cast<float>(eye.z_m - g.height_m);
-    const float square_m2 = block.x_m[i] * block.x_m[i] + block.y_m[i] * block.y_m[i];
-    ring_square[i] = square_m2 / (g.radius_m * g.radius_m);
-    block.distance_m[i] = std::sqrt(square_m2);
+    block.radius_m[i] = g.radius_m;
+    block.distance_m[i] = std::sqrt(block.x_m[i] * block.x_m[i] + block.y_m[i] * block.y_m[i]);
   }
-  for (std::size_t i = 0; i < block.count; ++i) {
-    // Within the circle there is no ring, and perhaps no direction.
-    const bool is_near = !(ring_square[i] >= 1);
-    block.ring[i] = is_near ? -1 : ring_of(regions.layout, ring_square[i]);
-    block.sector[i] = is_near ? 0 : sector_of(regions.layout, block.x_m[i], block.y_m[i]);
-  }
+  find_cells(regions.layout, block.x_m.data(), block.y_m.data(), block.radius_m.data(),
+             block.ring.data(), block.sector.data());
 }
 
 }  // namespace
@@ -112,19 +124,29 @@ std::size_t CertifiedCulling::find_visible(const Camera& camera, const GroupInde
                                            std::size_t count, std::span<GroupIndex> visible) const {
   assert(visible.size() >= count);
   const ViewWedge wedge(camera.eye, camera.view.value_or(ViewRange{0, 100}));
-  Block block;
-  std::size_t found = 0;
-  for (std::size_t next = 0; next < count;) {
+  std::array<Block, 2> blocks;
+  std::size_t found = 0, next = 0;
+  const auto take = [&](Block& block) {
     // The view first: it costs a few multiplications, a look-up mostly a miss of the cache.
     next = fill(regions_, wedge.shows_all() ? nullptr : &wedge, among, next, count, block);
     place_camera(regions_, camera.eye, block);
-    for (std::size_t i = 0; i < block.count; ++i)
-      __builtin_prefetch(&regions_.at(block.group[i], block.sector[i]));
-    for (std::size_t i = 0; i < block.count; ++i) {
-      const GroupIndex group = block.group[i];
-      const bool is_hidden = block.ring[i] >= 0 &&
-                             hides_at(regions_.groups[group], regions_.at(group, block.sector[i]),
-                                      block.ring[i], block.distance_m[i], block.rise_m[i]);
+  };
+  const auto steps_for = [&](const Block& block, std::size_t i) {
+    return &regions_.at(block.group[i], block.sector[i]);
+  };
+  Block *now = &blocks[0], *then = &blocks[1];
+  take(*now);
+  for (std::size_t i = 0; i < now->count; ++i) __builtin_prefetch(steps_for(*now, i));
+  for (; now->count > 0; std::swap(now, then)) {
+    take(*then);
+    // What the next block needs is fetched between the tests of this one.
+    for (std::size_t i = 0; i < std::max(now->count, then->count); ++i) {
+      if (i < then->count) __builtin_prefetch(steps_for(*then, i));
+      if (i >= now->count) continue;
+      const GroupIndex group = now->group[i];
+      const bool is_hidden =
+          now->ring[i] >= 0 && hides_at(regions_.groups[group], *steps_for(*now, i), now->ring[i],
+                                        now->distance_m[i], now->rise_m[i]);
       visible[found] = group;
       found += !is_hidden;
     }

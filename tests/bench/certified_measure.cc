@@ -14,6 +14,7 @@
 #include "core/occlusion/splitmix64.h"
 #include "core/occlusion/squares.h"
 #include "core/sight/triangle_sight.h"
+#include "tiles/store/groups_file.h"
 
 namespace scarp::test {
 namespace {
@@ -186,7 +187,7 @@ void certify(const Tin& tin, const CertifiedQuestion& question, Partition& part)
     std::exit(1);
   }
   const auto triangles = static_cast<double>(tin.triangles.size());
-  part.bytes_per_triangle = static_cast<double>(certified_bytes(part.regions)) / part.groups.count *
+  part.bytes_per_triangle = static_cast<double>(kept_bytes(part.regions)) / part.groups.count *
                             part.all_groups / triangles;
   if (part.groups.count == part.all_groups) return;
   const double all_s = predicted_s(tin, options, part, part.certify_user_s);

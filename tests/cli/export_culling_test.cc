@@ -138,7 +138,7 @@ TEST_F(ExportCulling, TablesSayWhatTheFileSays) {
   EXPECT_DOUBLE_EQ(row->GetFieldAsDouble("centre_x_m"), record.x * culling.unit_m());
   int bytes = 0;
   const GByte* steps = row->GetFieldAsBinary(row->GetFieldIndex("steps"), &bytes);
-  ASSERT_EQ(bytes, static_cast<int>(record.sectors * 8));
+  ASSERT_EQ(bytes, static_cast<int>(record.sectors * 16));
   EXPECT_EQ(std::memcmp(steps, record.steps, static_cast<std::size_t>(bytes)), 0);
 }
 

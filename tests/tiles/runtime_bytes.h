@@ -70,7 +70,7 @@ inline void reseal_culling_file(std::uint8_t* bytes, std::size_t size) {
                                  n * 4,
                                  n * 24,
                                  (n + 31) / 32 * 24,
-                                 n * sectors * 8,
+                                 n * sectors * 16,
                                  cells * 2};
   std::uint64_t at = kHeader;
   for (std::size_t i = 0; i < std::size(sizes); ++i) {

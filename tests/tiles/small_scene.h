@@ -67,7 +67,9 @@ inline Groups small_certified_groups(const Tin& tin) {
     const auto step = [&](int ring, int code) {
       return static_cast<std::uint16_t>((ring << kSlopeBits) + code);
     };
-    regions.steps.push_back({step(0, 0), step(i, 40 * i), step(i + 3, 7), step(i + 3, 1023)});
+    const std::uint16_t last = step(i + 3, 1023);
+    regions.steps.push_back(
+        {step(0, 0), step(i, 40 * i), step(i + 3, 7), last, last, last, last, last});
   }
   return groups;
 }

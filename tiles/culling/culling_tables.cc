@@ -122,7 +122,7 @@ void add_groups(Table table, const runtime::Culling& culling) {
     row->SetField(7, record.low_slope * 0x1p-20);
     row->SetField(8, record.slope_step * 0x1p-30);
     for (int i = 0; i < 6; ++i) row->SetField(9 + i, record.box[i] * unit_m);
-    row->SetField(15, static_cast<int>(record.sectors * 8), record.steps);
+    row->SetField(15, static_cast<int>(record.sectors * runtime::detail::kSteps * 2), record.steps);
     table.add(row);
   }
 }

@@ -121,8 +121,8 @@ export class Culling {
         throw new ScarpFileError('not-ours', 'this is no file of scarp export --to groups');
     const u32 = (at) => view.getUint32(at, true);
     const i32 = (at) => view.getInt32(at, true);
-    if (u32(8) !== 1)
-      throw new ScarpFileError('version', `the file has version ${u32(8)}; 1 was expected`);
+    if (u32(8) !== 2)
+      throw new ScarpFileError('version', `the file has version ${u32(8)}; 2 was expected`);
     if (bytes.length < HEADER_BYTES) throw damaged('it ends within its header');
     if (u32(252) !== crcOf(bytes, 0, 252)) throw damaged('the checksum of its header is wrong');
     if (u32(12) !== HEADER_BYTES || u32(16) !== bytes.length || u32(20) !== 0 || u32(244) !== 0 ||
@@ -173,7 +173,7 @@ export class Culling {
     }
     const blocks = Math.ceil(n / BLOCK_GROUPS);
     const sizes = [this.tiles * 64, n * 4, n * 4, n * 4, n * 4, n * 4, n * 4, n * 4, n * 4, n * 24,
-      blocks * 24, n * this.sectors * 8, cells * 2];
+      blocks * 24, n * this.sectors * 16, cells * 2];
     const begins = [];
     let at = HEADER_BYTES;
     for (let i = 0; i < SECTIONS; ++i) {
@@ -387,13 +387,17 @@ export class Culling {
   // The code of the last step that is not beyond the ring; 0: nothing is hidden.
   _codeAt(group, sector, ring) {
     const steps = this.steps;
-    const at = (group * this.sectors + sector) * 4;
+    const at = (group * this.sectors + sector) * 8;
     const last = (ring << 10) | 1023;
     let code = 0;
     if (steps[at] <= last) code = steps[at];
     if (steps[at + 1] <= last) code = steps[at + 1];
     if (steps[at + 2] <= last) code = steps[at + 2];
     if (steps[at + 3] <= last) code = steps[at + 3];
+    if (steps[at + 4] <= last) code = steps[at + 4];
+    if (steps[at + 5] <= last) code = steps[at + 5];
+    if (steps[at + 6] <= last) code = steps[at + 6];
+    if (steps[at + 7] <= last) code = steps[at + 7];
     return code & 1023;
   }
 

@@ -112,7 +112,7 @@ struct GroupRecord {
   std::int32_t low_slope;      ///< of code 1, 2^-20
   std::uint32_t slope_step;    ///< from code to code, 2^-30
   const std::int32_t* box;     ///< [6] low x, y, z, high x, y, z without refraction, units
-  const std::uint16_t* steps;  ///< [sectors * 4]
+  const std::uint16_t* steps;  ///< [sectors * 8]
   std::uint32_t sectors;
 };
 
@@ -143,9 +143,10 @@ static_assert(sizeof(Tile) == 64, "as in the file");
 
 namespace detail {
 
-constexpr std::uint32_t kHeaderBytes = 256, kVersionOfFile = 1, kSections = 13;
+constexpr std::uint32_t kHeaderBytes = 256, kVersionOfFile = 2, kSections = 13;
 constexpr std::uint32_t kMostGroups = 1U << 28, kMostTiles = 1U << 24, kMostCells = 1U << 30;
 constexpr std::uint32_t kBlockGroups = 32;  ///< groups that share a box for frustums
+constexpr std::uint32_t kSteps = 8;         ///< of a sector
 constexpr std::uint32_t kSlopeBits = 10, kSlopeCodes = 1U << kSlopeBits;
 constexpr double kReach = 2147483000.0;    // coordinates in units fit 32 bits
 constexpr double kMostParts = 67108864.0;  // 2^26
@@ -276,7 +277,7 @@ class Culling {
             low_[group],
             step_[group],
             box_ + std::size_t{group} * 6,
-            steps_ + std::size_t{group} * sectors_ * 4,
+            steps_ + std::size_t{group} * sectors_ * detail::kSteps,
             sectors_};
   }
 
@@ -348,7 +349,7 @@ class Culling {
   }
   static std::uint32_t code_at(const std::uint16_t* steps, std::int32_t last);
   std::uint32_t code_of(std::uint32_t group, const Look& look) const {
-    return code_at(steps_ + (std::size_t{group} * sectors_ + look.sector) * 4,
+    return code_at(steps_ + (std::size_t{group} * sectors_ + look.sector) * detail::kSteps,
                    last_step_of(look.ring));
   }
   std::int64_t slope_of(std::uint32_t group, std::uint32_t code) const;
@@ -543,7 +544,7 @@ inline bool Culling::place_sections(std::uint64_t size, bool check) {
                                                           n * 4,
                                                           n * 24,
                                                           blocks * 24,
-                                                          n * sectors_ * 8,
+                                                          n * sectors_ * detail::kSteps * 2,
                                                           cells * 2};
   const void* sections[detail::kSections];
   std::uint64_t at = detail::kHeaderBytes;
@@ -759,8 +760,19 @@ inline Culling::Look Culling::look_at(const Aim& aim, std::uint32_t group) const
 /// The code of the last of a sector's steps that is not beyond, 0 for none. Without branches, which
 /// would be guessed wrong half of the time; rings rise from step to step.
 inline std::uint32_t Culling::code_at(const std::uint16_t* steps, std::int32_t last) {
-  const int count =
-      int(steps[0] <= last) + int(steps[1] <= last) + int(steps[2] <= last) + int(steps[3] <= last);
+  int count = 0;
+#if defined(__SSE2__)
+  // Steps and the last one allowed are below 2^16; none is allowed within the circle, where it is
+  // -1.
+  const __m128i row = _mm_loadu_si128(reinterpret_cast<const __m128i*>(steps));
+  const __m128i beyond = _mm_subs_epu16(row, _mm_set1_epi16(static_cast<short>(last)));
+  const __m128i not_beyond = _mm_cmpeq_epi16(beyond, _mm_setzero_si128());
+  const __m128i ones = _mm_and_si128(not_beyond, _mm_set1_epi16(1));
+  const __m128i halves = _mm_sad_epu8(ones, _mm_setzero_si128());
+  count = (_mm_cvtsi128_si32(halves) + _mm_extract_epi16(halves, 4)) & ~(last >> 31);
+#else
+  for (std::uint32_t i = 0; i < detail::kSteps; ++i) count += int(steps[i] <= last);
+#endif
   const int has_step = int(count > 0);
   return (steps[count - has_step] & (detail::kSlopeCodes - 1)) * std::uint32_t(has_step);
 }
@@ -800,31 +812,39 @@ inline void Culling::hidden_block(const Aim& aim, std::uint32_t first, std::uint
                                   unsigned char* hidden) const {
   double distance[64], rise[64];
   std::int32_t sector[64], last[64];
+  const std::uint16_t* steps[64];
+  const std::size_t row = std::size_t{sectors_} * detail::kSteps;
+  const std::uint16_t* const first_row = steps_ + std::size_t{first} * row;
   std::uint32_t done = 0;
+  // Fetched group by group: what a miss takes is spent on where the camera is from the next ones.
+  const auto fetch = [&](std::uint32_t some) {
+    for (const std::uint32_t end = done + some; done < end; ++done) {
+      steps[done] = first_row + (done * row + std::size_t(sector[done]) * detail::kSteps);
+#if defined(__GNUC__)
+      __builtin_prefetch(steps[done]);
+#endif
+    }
+  };
 #if defined(SCARP_RUNTIME_AVX2)
   if (has_avx2_)
-    for (; done + 4 <= count; done += 4)
+    while (done + 4 <= count) {
       look_at_four(aim, first + done, distance + done, rise + done, sector + done, last + done);
+      fetch(4);
+    }
 #endif
 #if defined(__SSE2__)
-  for (; done + 2 <= count; done += 2)
+  while (done + 2 <= count) {
     look_at_two(aim, first + done, distance + done, rise + done, sector + done, last + done);
+    fetch(2);
+  }
 #endif
-  for (; done < count; ++done) {
+  while (done < count) {
     const Look look = look_at(aim, first + done);
     distance[done] = look.distance;
     rise[done] = (aim.z - height_[first + done]) * (detail::kSlopeOne * aim.parts);
     sector[done] = static_cast<std::int32_t>(look.sector);
     last[done] = look.is_near ? -1 : last_step_of(look.ring);
-  }
-  const std::uint16_t* steps[64];
-  const std::size_t row = std::size_t{sectors_} * 4;
-  const std::uint16_t* const first_row = steps_ + std::size_t{first} * row;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    steps[i] = first_row + (i * row + std::size_t(sector[i]) * 4);
-#if defined(__GNUC__)
-    __builtin_prefetch(steps[i]);
-#endif
+    fetch(1);
   }
   for (std::uint32_t i = 0; i < count; ++i) {
     const std::uint32_t code = code_at(steps[i], last[i]);

@@ -5,13 +5,15 @@
 #include <cassert>
 #include <cmath>
 #include <tuple>
+#include <utility>
 
 #include "tiles/store/layout_section.h"
+#include "tiles/store/pack.h"
 
 namespace scarp {
 namespace {
 
-constexpr std::uint32_t kGroupsVersion = 2;
+constexpr std::uint32_t kGroupsVersion = 3;
 
 static_assert(sizeof(RegionPoint) == 2 * sizeof(double));
 
@@ -34,64 +36,151 @@ struct CertifiedScale {
 };
 
 constexpr std::size_t kStepsOfSector = std::tuple_size_v<SectorSteps>;
-constexpr std::size_t kPlanesOfStep = 3;
+constexpr int kNoLaterRing = 128;
 
-std::uint8_t sign_lowest(int value) {
-  return static_cast<std::uint8_t>(value << 1 ^ value >> 31);
-}
+/// The steps of a sector, and of the one before it in its group, which they are told from: sectors
+/// side by side have much in common.
+class SectorBefore {
+ public:
+  void forget() { count_ = 0; }
 
-/// Steps as differences from the sector before, in bytes of one meaning after the other, so that
-/// they can be packed: of each step the rings of all groups and sectors, then the low bytes of
-/// their codes, then the high ones.
-std::vector<std::uint8_t> planes_of(const CertifiedRegions& regions) {
-  const std::size_t count = regions.steps.size();
-  std::vector<std::uint8_t> planes(kStepsOfSector * kPlanesOfStep * count);
-  std::uint8_t* ring = planes.data();
-  for (std::size_t k = 0; k < kStepsOfSector; ++k, ring += kPlanesOfStep * count) {
-    std::uint32_t before = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::uint32_t step = regions.steps[i][k];
-      ring[i] = sign_lowest(static_cast<int>(step >> kSlopeBits) -
-                            static_cast<int>(before >> kSlopeBits));
-      const int difference =
-          static_cast<int>(step % kSlopeCodes) - static_cast<int>(before % kSlopeCodes);
-      const auto code = static_cast<std::uint32_t>(difference << 1 ^ difference >> 31);
-      ring[count + i] = static_cast<std::uint8_t>(code);
-      ring[2 * count + i] = static_cast<std::uint8_t>(code >> 8);
-      before = step;
-    }
+  void remember(const SectorSteps& steps, std::size_t count) {
+    steps_ = steps;
+    count_ = count;
   }
-  return planes;
+
+  /// The first of its rings beyond one; none: -1.
+  int ring_beyond(int ring) const {
+    for (std::size_t i = 0; i < count_; ++i)
+      if (ring_at(i) > ring) return ring_at(i);
+    return -1;
+  }
+
+  /// The code that holds in a ring; none: 0.
+  int code_in(int ring) const {
+    int code = 0;
+    for (std::size_t i = 0; i < count_ && ring_at(i) <= ring; ++i)
+      code = steps_[i] & (kSlopeCodes - 1);
+    return code;
+  }
+
+ private:
+  int ring_at(std::size_t i) const { return steps_[i] >> kSlopeBits; }
+
+  SectorSteps steps_{};
+  std::size_t count_ = 0;
+};
+
+/// Steps in bytes of one meaning after the other, so that they can be packed.
+struct StepPlanes {
+  std::vector<std::uint8_t> count;       // of each sector: steps without the last one's repeats
+  std::vector<std::uint8_t> first_ring;  // of each sector
+  std::vector<std::uint8_t> ring;        // of each later step
+  std::vector<std::uint8_t> low, high;   // of each step's code
+};
+
+unsigned sign_lowest(int value) {
+  return static_cast<unsigned>(value << 1 ^ value >> 31);
 }
 
-std::vector<SectorSteps> steps_of(const std::vector<std::uint8_t>& planes,
-                                  const SectionFile& file) {
-  const std::size_t count = planes.size() / (kStepsOfSector * kPlanesOfStep);
-  if (planes.size() % (kStepsOfSector * kPlanesOfStep) != 0)
-    file.fail("steps of certified regions that do not come in fours");
-  std::vector<SectorSteps> steps(count);
-  const std::uint8_t* ring = planes.data();
-  const auto difference = [](std::uint32_t code) { return (code >> 1) ^ (0 - (code & 1)); };
-  for (std::size_t k = 0; k < kStepsOfSector; ++k, ring += kPlanesOfStep * count) {
-    std::uint32_t ring_before = 0, code_before = 0;
+int from_sign_lowest(unsigned code) {
+  return static_cast<int>((code >> 1) ^ (0 - (code & 1)));
+}
+
+/// Steps up to those that only repeat the one before.
+std::size_t different(const SectorSteps& steps) {
+  std::size_t count = steps.size();
+  while (count > 1 && steps[count - 1] == steps[count - 2]) --count;
+  return count;
+}
+
+std::vector<std::uint8_t> planes_of(const CertifiedRegions& regions) {
+  StepPlanes planes;
+  SectorBefore before;
+  const auto sectors = static_cast<std::size_t>(regions.layout.sectors);
+  for (std::size_t row = 0; row < regions.steps.size(); ++row) {
+    if (row % sectors == 0) before.forget();
+    const SectorSteps& steps = regions.steps[row];
+    const std::size_t count = different(steps);
+    planes.count.push_back(static_cast<std::uint8_t>(count));
     for (std::size_t i = 0; i < count; ++i) {
-      ring_before += difference(ring[i]);
-      code_before += difference(ring[count + i] | std::uint32_t{ring[2 * count + i]} << 8);
-      // What no writer makes comes out as some other step.
-      steps[i][k] = static_cast<std::uint16_t>((ring_before << kSlopeBits) |
-                                               (code_before & (kSlopeCodes - 1)));
+      const int ring = steps[i] >> kSlopeBits, code = steps[i] & (kSlopeCodes - 1);
+      if (i == 0) {
+        planes.first_ring.push_back(static_cast<std::uint8_t>(ring));
+      } else {
+        const int last = steps[i - 1] >> kSlopeBits, beyond = before.ring_beyond(last);
+        const unsigned told = beyond < 0 ? static_cast<unsigned>(kNoLaterRing + (ring - last))
+                                         : sign_lowest(ring - beyond);
+        planes.ring.push_back(static_cast<std::uint8_t>(told));
+      }
+      const unsigned told = sign_lowest(code - before.code_in(ring));
+      planes.low.push_back(static_cast<std::uint8_t>(told));
+      planes.high.push_back(static_cast<std::uint8_t>(told >> 8));
     }
+    before.remember(steps, count);
+  }
+  std::vector<std::uint8_t> all = std::move(planes.count);
+  for (const auto* plane : {&planes.first_ring, &planes.ring, &planes.low, &planes.high})
+    all.insert(all.end(), plane->begin(), plane->end());
+  return all;
+}
+
+/// What no writer makes comes out as some other step.
+std::vector<SectorSteps> steps_of(const std::vector<std::uint8_t>& planes, std::size_t rows,
+                                  std::size_t sectors, const SectionFile& file) {
+  if (planes.size() < rows) file.fail("fewer counts of steps than certified sectors");
+  std::size_t all = 0;
+  for (std::size_t row = 0; row < rows; ++row) {
+    if (planes[row] < 1 || planes[row] > kStepsOfSector)
+      file.fail(fmt::format("{} steps in a certified sector where 1 to {} were expected",
+                            planes[row], kStepsOfSector));
+    all += planes[row];
+  }
+  // Counts and first rings are of sectors, rings but those, low and high bytes of steps.
+  if (planes.size() != rows + 3 * all)
+    file.fail(fmt::format("{} bytes of certified steps where {} were expected", planes.size(),
+                          rows + 3 * all));
+  const std::uint8_t* first_ring = planes.data() + rows;
+  const std::uint8_t* told_ring = first_ring + rows;
+  const std::uint8_t* low = told_ring + (all - rows);
+  const std::uint8_t* high = low + all;
+  std::vector<SectorSteps> steps(rows);
+  SectorBefore before;
+  for (std::size_t row = 0; row < rows; ++row) {
+    if (row % sectors == 0) before.forget();
+    const std::size_t count = planes[row];
+    int ring = first_ring[row] % kRings;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (i > 0) {
+        const unsigned told = *told_ring++;
+        const int beyond = before.ring_beyond(ring);
+        ring = (beyond < 0 ? ring + static_cast<int>(told) - kNoLaterRing
+                           : beyond + from_sign_lowest(told)) &
+               (kRings - 1);
+      }
+      const int told = from_sign_lowest(*low++ | unsigned{*high++} << 8);
+      steps[row][i] = static_cast<std::uint16_t>(
+          ring << kSlopeBits | ((before.code_in(ring) + told) & (kSlopeCodes - 1)));
+    }
+    std::fill(steps[row].begin() + static_cast<std::ptrdiff_t>(count), steps[row].end(),
+              steps[row][count - 1]);
+    before.remember(steps[row], count);
   }
   return steps;
+}
+
+void describe(const CertifiedRegions& regions, std::vector<CertifiedPlace>& places,
+              std::vector<CertifiedScale>& scales) {
+  for (const CertifiedGroup& g : regions.groups) {
+    places.push_back({g.centre_x_m, g.centre_y_m, g.height_m});
+    scales.push_back({g.radius_m, g.low_slope, g.slope_step});
+  }
 }
 
 void add_certified(SectionFileWriter& writer, const CertifiedRegions& regions) {
   std::vector<CertifiedPlace> places;
   std::vector<CertifiedScale> scales;
-  for (const CertifiedGroup& g : regions.groups) {
-    places.push_back({g.centre_x_m, g.centre_y_m, g.height_m});
-    scales.push_back({g.radius_m, g.low_slope, g.slope_step});
-  }
+  describe(regions, places, scales);
   const std::vector<std::int32_t> layout = {regions.layout.sectors, regions.layout.ring_bits};
   writer.add_owned<std::int32_t>("cert_layout", layout);
   writer.add_packed<double>("cert_place", places);
@@ -113,7 +202,11 @@ void read_certified(Groups& groups, const SectionFile& file) {
   for (std::size_t g = 0; g < places.size(); ++g)
     regions.groups.push_back({places[g].centre_x_m, places[g].centre_y_m, places[g].height_m,
                               scales[g].radius_m, scales[g].low_slope, scales[g].slope_step});
-  regions.steps = steps_of(file.unpack<std::uint8_t, std::uint8_t>("cert_steps"), file);
+  if (regions.layout.sectors < 8 || regions.layout.sectors > 4096)
+    file.fail("of the certified regions, sectors are not a multiple of 8 from 8 to 4096");
+  const auto sectors = static_cast<std::size_t>(regions.layout.sectors);
+  regions.steps = steps_of(file.unpack<std::uint8_t, std::uint8_t>("cert_steps"),
+                           places.size() * sectors, sectors, file);
   if (const auto broken = check_certified(regions))
     file.fail(fmt::format("of the certified regions, {}", *broken));
   // Cameras are looked up in float: a centre from which a square of a distance overflows has none.
@@ -196,6 +289,16 @@ void check_regions(const Groups& groups, const SectionFile& file) {
 }
 
 }  // namespace
+
+std::size_t kept_bytes(const CertifiedRegions& regions) {
+  std::vector<CertifiedPlace> places;
+  std::vector<CertifiedScale> scales;
+  describe(regions, places, scales);
+  const std::vector<std::uint8_t> steps = planes_of(regions);
+  return packed(std::as_bytes(std::span(places))).size() +
+         packed(std::as_bytes(std::span(scales))).size() +
+         packed(std::as_bytes(std::span(steps))).size();
+}
 
 SectionFileWriter groups_writer(const Groups& groups) {
   const Regions& regions = groups.regions;

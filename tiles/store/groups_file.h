@@ -13,6 +13,10 @@ inline constexpr FileKind kGroupsKind = {'G', 'R', 'P', 'S'};
 /// core/occlusion/groups.h states (asserted).
 SectionFileWriter groups_writer(const Groups& groups);
 
+/// What certified regions take in such a file, without its table of sections: bytes.
+/// Cost: that of packing them.
+std::size_t kept_bytes(const CertifiedRegions& regions);
+
 /// Errors: those of PartFile.
 void write_groups(const std::string& path, const Groups& groups, Existing existing);
 

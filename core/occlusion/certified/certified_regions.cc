@@ -19,11 +19,16 @@ bool hides_group(const CertifiedRegions& regions, std::uint32_t group, const Pos
                   static_cast<float>(eye.z_m - g.height_m));
 }
 
+double kept_group_bytes(std::int32_t sectors) {
+  constexpr double kPlace = 36, kOfOne = 10.4, kInCommon = 0.69;  // for each doubling
+  return kPlace + sectors * (kOfOne - kInCommon * std::log2(sectors));
+}
+
 std::int32_t sectors_within(double bytes, std::size_t triangles, std::uint32_t groups) {
   const double each = bytes * static_cast<double>(triangles) / std::max(1U, groups);
-  const double room = each - static_cast<double>(sizeof(CertifiedGroup));
-  const double eighths = std::floor(room / (8 * sizeof(SectorSteps)));
-  return 8 * static_cast<std::int32_t>(std::clamp(eighths, 1.0, 512.0));
+  std::int32_t sectors = 8;
+  while (sectors < 4096 && kept_group_bytes(sectors + 8) <= each) sectors += 8;
+  return sectors;
 }
 
 std::optional<std::string> check_certified(const CertifiedRegions& regions) {

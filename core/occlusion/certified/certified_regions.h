@@ -24,14 +24,23 @@ struct CertifiedGroup {
 };
 
 /// From which ring on which slope hides, for one sector of camera azimuths: by rising ring, the
-/// last one not beyond the camera's ring counts. A step is ring << 10 | code. Code 0: nothing is
-/// hidden; otherwise the group is hidden from a camera strictly under
-/// height_m + (low_slope + (code - 1) * slope_step) * distance from the centre.
-using SectorSteps = std::array<std::uint16_t, 4>;
+/// last one not beyond the camera's ring counts; where fewer are needed, the last repeats. A step
+/// is ring << 10 | code. Code 0: nothing is hidden; otherwise the group is hidden from a camera
+/// strictly under height_m + (low_slope + (code - 1) * slope_step) * distance from the centre.
+using SectorSteps = std::array<std::uint16_t, 8>;
+
+/// So many different steps the sectors of a group have at most in the mean. They are shared out to
+/// where they hide most: eight in every sector would take more than twice the bytes, and hide next
+/// to nothing more.
+inline constexpr double kMeanSteps = 3.75;
+
+/// What the regions of a group take where they are kept, packed (tiles/store/groups_file.h): bytes,
+/// an eighth more than was measured on real ground. Wider sectors have less in common.
+double kept_group_bytes(std::int32_t sectors);
 
 /// Where cameras are hidden from groups for certain. Side: never larger than the truth; what it
 /// hides is hidden, which follows from the surface alone (hiding_bounds.h) and not from horizons of
-/// vertices. 8 bytes for each sector and 40 for each group.
+/// vertices. In memory 16 bytes for each sector and 40 for each group.
 struct CertifiedRegions {
   PolarLayout layout;
   std::vector<CertifiedGroup> groups;
@@ -55,14 +64,21 @@ inline float slope_of(const CertifiedGroup& group, std::int32_t code) {
 /// roundings), its product with a slope, a difference, and the float of the camera's height.
 inline constexpr float kHeightRounding = 0x1p-20F;
 
+/// The code that a sector's steps have in a ring. Counted without branches, which would be guessed
+/// wrong half of the time; rings do not fall from step to step.
+inline std::int32_t code_in(const SectorSteps& steps, std::int32_t ring) {
+  const auto last_of_ring = static_cast<std::uint16_t>(ring << kSlopeBits | (kSlopeCodes - 1));
+  std::uint16_t count = 0;
+  for (const std::uint16_t step : steps)
+    count = static_cast<std::uint16_t>(count + (step <= last_of_ring));
+  return count > 0 ? steps[count - 1U] & (kSlopeCodes - 1) : 0;
+}
+
 /// Whether a sector's steps hide the group from a camera in `ring`, at a distance from the centre
 /// and a height above the group's. The test that everything at run time comes down to.
 inline bool hides_at(const CertifiedGroup& group, const SectorSteps& steps, std::int32_t ring,
                      float distance_m, float rise_m) {
-  const std::int32_t last_of_ring = ring << kSlopeBits | (kSlopeCodes - 1);
-  std::int32_t code = 0;
-  for (const std::uint16_t step : steps)
-    if (step <= last_of_ring) code = step & (kSlopeCodes - 1);
+  const std::int32_t code = code_in(steps, ring);
   const float line_m = slope_of(group, code) * distance_m;
   const float margin_m = (std::abs(rise_m) + std::abs(line_m)) * kHeightRounding;
   return code > 0 && rise_m < line_m - margin_m;
@@ -72,7 +88,8 @@ inline bool hides_at(const CertifiedGroup& group, const SectorSteps& steps, std:
 /// method certified is the same for many. A camera within the group's circle is not.
 bool hides_group(const CertifiedRegions& regions, std::uint32_t group, const Position& eye);
 
-/// Sectors for which the regions of groups with `triangles` in all take at most `bytes` a triangle.
+/// Sectors for which the regions of groups with `triangles` in all take about `bytes` a triangle
+/// where they are kept, packed; less on nearly all ground.
 /// @return a multiple of 8, at least 8, at most 4096
 std::int32_t sectors_within(double bytes, std::size_t triangles, std::uint32_t groups);
 

@@ -10,8 +10,9 @@
 
 namespace scarp {
 
-/// Bounds in the form that is kept: in each sector, rings are shared out to four steps so
-/// that least is lost of the room that cameras can be in; slopes are rounded down.
+/// Bounds in the form that is kept: in each sector, rings are shared out to up to eight steps, so
+/// many in each that least is lost of the room that cameras can be in around the group; slopes are
+/// rounded down.
 CertifiedRegions compress_bounds(const HidingBounds& bounds, const LeastGround& ground);
 
 /// Regions of groups of a surface. Requires what bound_hiding does.

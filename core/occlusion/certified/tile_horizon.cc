@@ -110,16 +110,13 @@ double slope_under(const TileHorizon& horizon, const Seen& seen, double slope,
 double least_slope(const TileHorizon& horizon, const CertifiedGroup& group, const Seen& seen,
                    const SectorSteps& steps, std::int32_t first_ring, std::int32_t last_ring,
                    const CameraPart& part) {
-  std::int32_t code = 0;
   double least = std::numeric_limits<double>::infinity();
   const auto take = [&](std::int32_t c) {
     least = c == 0 ? -std::numeric_limits<double>::infinity()
                    : std::min(least, slope_under(horizon, seen, slope_of(group, c), part));
   };
   // The code that holds where the range begins, then those that begin within it.
-  for (const std::uint16_t step : steps)
-    if (step <= (first_ring << kSlopeBits | (kSlopeCodes - 1))) code = step & (kSlopeCodes - 1);
-  take(code);
+  take(code_in(steps, first_ring));
   for (const std::uint16_t step : steps)
     if (step >> kSlopeBits > first_ring && step >> kSlopeBits <= last_ring &&
         least > -std::numeric_limits<double>::infinity())

@@ -2,12 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <random>
 
 #include "core/culling/certified_culling.h"
 #include "core/error/error.h"
+#include "core/occlusion/splitmix64.h"
 #include "tests/tiles/limits.h"
 #include "tests/tiles/reseal.h"
 #include "tests/tiles/small_scene.h"
@@ -441,6 +443,35 @@ TEST(GroupsFile, CertifiedRegionsRoundTrip) {
                    .has("cert_layout"));
 }
 
+TEST(GroupsFile, AnyCertifiedStepsComeBack) {
+  SplitMix64 random(3);
+  Groups groups = test::small_certified_groups(test::grid_tin(4, 3));
+  for (int trial = 0; trial < 200; ++trial) {
+    for (SectorSteps& steps : groups.certified.steps) {
+      const std::uint32_t most = random.below(3) == 0 ? 65'536 : 9'000;
+      for (std::uint16_t& step : steps) step = static_cast<std::uint16_t>(random.below(most));
+      // Steps may repeat anywhere, and more than one begin with the same ring.
+      if (random.below(2) == 0) steps[3] = steps[4] = steps[5];
+      if (random.below(2) == 0) steps[6] = steps[7] = 65'535;
+      std::sort(steps.begin(), steps.end());
+    }
+    const Bytes bytes = groups_writer(groups).to_bytes();
+    const Groups back = read_groups(SectionFile::from_memory(bytes, "f"));
+    ASSERT_EQ(back.certified.steps, groups.certified.steps) << trial;
+  }
+}
+
+TEST(GroupsFile, KeptBytesAreThoseOfTheSections) {
+  Groups groups = test::small_certified_groups(test::grid_tin(4, 3));
+  const std::size_t with = groups_writer(groups).to_bytes().size();
+  const std::size_t kept = kept_bytes(groups.certified);
+  groups.certified = {};
+  const std::size_t without = groups_writer(groups).to_bytes().size();
+  EXPECT_GT(kept, 0U);
+  EXPECT_LT(kept, with - without);
+  EXPECT_GT(kept + 512, with - without);  // the table's entries, and sections begin at multiples
+}
+
 TEST(GroupsFile, RefusesCertifiedRegionsThatCannotBeAsked) {
   const auto complains = [](const std::string& part,
                             const std::function<void(CertifiedRegions&)>& damage) {
@@ -451,7 +482,7 @@ TEST(GroupsFile, RefusesCertifiedRegionsThatCannotBeAsked) {
   };
   complains("sectors are not a multiple of 8", [](CertifiedRegions& r) { r.layout.sectors = 4; });
   complains("ring bits", [](CertifiedRegions& r) { r.layout.ring_bits = 4; });
-  complains("row of steps", [](CertifiedRegions& r) { r.steps.pop_back(); });
+  complains("in a certified sector where", [](CertifiedRegions& r) { r.steps.pop_back(); });
   complains("no proper circle", [](CertifiedRegions& r) { r.groups[1].radius_m = 0; });
   complains("no proper circle", [](CertifiedRegions& r) { r.groups[0].low_slope = NAN; });
   complains("no proper circle", [](CertifiedRegions& r) { r.groups[0].slope_step = -1; });
