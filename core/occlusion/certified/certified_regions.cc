@@ -20,7 +20,7 @@ bool hides_group(const CertifiedRegions& regions, std::uint32_t group, const Pos
 }
 
 double kept_group_bytes(std::int32_t sectors) {
-  constexpr double kPlace = 36, kOfOne = 10.4, kInCommon = 0.69;  // for each doubling
+  constexpr double kPlace = 36, kOfOne = 10.75, kInCommon = 0.69;  // for each doubling
   return kPlace + sectors * (kOfOne - kInCommon * std::log2(sectors));
 }
 
