@@ -140,11 +140,13 @@ ViewSource::SceneGround::SceneGround(const std::string& path, const std::optiona
     : tiles(path),
       dem(dem_of(tiles.scene().description())),
       discs(discs_of(tiles, reach)),
-      window(tiles.window_of(tiles_for(tiles, discs))),
-      part(place_part(dem, window)),
-      ground(tiles, {tiles.tiles_over(window), discs}, memory_bytes,
-             "raise --memory, or give --max-distance") {
-  if (reach) part = crop_to_reach(std::move(part), discs, reach->distance_m, tiles.frame());
+      part(place_part(dem, tiles.window_of(tiles_for(tiles, discs)))),
+      ground(tiles,
+             {tiles.tiles_over({part.first_column, part.first_row, part.columns, part.rows, 1}),
+              discs},
+             memory_bytes, "raise --memory, or give --max-distance") {
+  if (reach && tiles.size() > 1)
+    part = crop_to_reach(std::move(part), discs, reach->distance_m, tiles.frame());
 }
 
 void ViewSource::stand_on_scene() {

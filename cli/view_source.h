@@ -27,10 +27,11 @@ class ViewSource {
  public:
   /// Throws Error: what a scene or a DEM throws; kUsage where options for reading a DEM are given
   /// with a scene, or a scene is not alone; kInput where obstacles do not share the DEM's cells.
-  /// @param reach  of a scene only the tiles that the eyes reach are read, those between them with
-  ///               them, or all where void that these cut might matter (PartGround); and the raster
-  ///               is the rectangle that the eyes reach, to whole blocks of GroundGrid's placement.
-  ///               What is seen and what is void are those of the whole raster. None: all
+  /// @param reach  of a scene of several tiles only those that the eyes reach are read, those
+  ///               between them with them, or all where void that these cut might matter
+  ///               (PartGround); and the raster is the rectangle that the eyes reach, a little more
+  ///               to the left and above, to whole blocks of GroundGrid's placement. What is seen
+  ///               and what is void are those of the whole raster. None: all
   ViewSource(const std::vector<std::string>& sources, const std::vector<std::string>& obstacles,
              const DemOptions& options, const Progress& progress,
              const std::optional<ViewReach>& reach = {});
@@ -82,7 +83,6 @@ class ViewSource {
     SceneTiles tiles;
     Dem dem;  ///< the scene's whole raster
     std::vector<ViewPlan> discs;
-    TileWindow window;   ///< of the tiles
     PartPlacement part;  ///< of the raster's part that is looked at
     PartGround ground;
 
