@@ -144,29 +144,53 @@ void TinHorizon::measure_near_ground() {
   });
 }
 
-void TinHorizon::fill(const Part& part) {
-  const double low = border(part.first), high = border(part.end);
-  const auto corner = [&](double tangent) -> Position {
-    const double aside = tangent * reach_m_;
-    switch (part.wedge) {
-      case 0:
-        return {eye_.x_m + reach_m_, eye_.y_m + aside, 0};
-      case 1:
-        return {eye_.x_m + aside, eye_.y_m + reach_m_, 0};
-      case 2:
-        return {eye_.x_m - reach_m_, eye_.y_m + aside, 0};
-      default:
-        return {eye_.x_m + aside, eye_.y_m - reach_m_, 0};
-    }
-  };
-  const std::array<Position, 3> corners{eye_, corner(low), corner(high)};
-  index_.visit_edges(corners, HeightFloor(), [&](std::uint32_t e) {
-    add(part, e);
-    return false;
-  });
+TinHorizon::Filling::Filling(const Part& of_bins)
+    : part(of_bins),
+      last(static_cast<std::size_t>(of_bins.end - of_bins.first), Record{0, -kInfinity, kNone}),
+      seen(kRemembered, kNone) {}
+
+/// Edges come in several bins of the index that lie next to each other.
+bool TinHorizon::Filling::is_new(std::uint32_t edge) {
+  std::uint32_t& at = seen[edge % kRemembered];
+  if (at == edge) return false;
+  at = edge;
+  return true;
 }
 
-void TinHorizon::add(const Part& part, std::uint32_t e) {
+/// Edges from near to far, by shells that double in depth, because what is far is mostly lower than
+/// what is kept already.
+void TinHorizon::fill(const Part& part) {
+  constexpr int kShells = 8;
+  const auto place = [&](double ahead, double tangent) -> Position {
+    const double aside = tangent * ahead;
+    switch (part.wedge) {
+      case 0:
+        return {eye_.x_m + ahead, eye_.y_m + aside, 0};
+      case 1:
+        return {eye_.x_m + aside, eye_.y_m + ahead, 0};
+      case 2:
+        return {eye_.x_m - ahead, eye_.y_m + aside, 0};
+      default:
+        return {eye_.x_m + aside, eye_.y_m - ahead, 0};
+    }
+  };
+  Filling filling(part);
+  const double low = border(part.first), high = border(part.end);
+  double near_m = 0;
+  for (int shell = kShells - 1; shell >= 0; --shell) {
+    const double far_m = std::ldexp(reach_m_, -shell);
+    const std::array<Position, 4> corners{place(near_m, low), place(near_m, high),
+                                          place(far_m, low), place(far_m, high)};
+    index_.visit_edges(corners, HeightFloor(), [&](std::uint32_t e) {
+      if (filling.is_new(e)) add(filling, e);
+      return false;
+    });
+    near_m = far_m;
+  }
+}
+
+void TinHorizon::add(Filling& filling, std::uint32_t e) {
+  const Part& part = filling.part;
   const MeshEdge& edge = index_.edges()[e];
   Place u = place(part.wedge, index_.tin().vertices[edge.from]);
   Place v = place(part.wedge, index_.tin().vertices[edge.to]);
@@ -189,7 +213,11 @@ void TinHorizon::add(const Part& part, std::uint32_t e) {
   const auto part_at = [&](double tangent) {
     return std::clamp((tangent - p.tangent) * per_tangent, 0.0, 1.0);
   };
+  const double top = std::max(p.rise, q.rise) + rise_margin;
+  const double nearest = std::max(p.nearness, q.nearness) + nearness_margin;
   for (int i = first; i <= last; ++i) {
+    Record& highest = filling.last[static_cast<std::size_t>(i - part.first)];
+    if (top <= highest.rise && nearest <= highest.nearness && !edge.is_border()) continue;
     double from = 0, to = 1;
     if (width >= kLeastWidth) {
       from = part_at(border(i) - kBesideBin);
@@ -202,6 +230,7 @@ void TinHorizon::add(const Part& part, std::uint32_t e) {
                         most(p.rise, q.rise) + rise_margin, e};
     Bin& here = bin(part.wedge, i);
     keep(here.records, record);
+    highest = here.records.back();
     if (edge.is_border()) here.nearest_border = std::max(here.nearest_border, record.nearness);
   }
 }

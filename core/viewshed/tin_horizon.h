@@ -70,6 +70,17 @@ class TinHorizon {
     int wedge, first, end;
   };
 
+  /// A part while it is filled.
+  struct Filling {
+    explicit Filling(const Part& of_bins);
+    bool is_new(std::uint32_t edge);
+
+    static constexpr std::uint32_t kRemembered = 8192;
+    Part part;
+    std::vector<Record> last;         // of each bin: the highest
+    std::vector<std::uint32_t> seen;  // edges that came lately
+  };
+
   static int wedge_of(double dx_m, double dy_m);
   Place place(int wedge, const Position& p) const;
   static Picture picture(const Place& p);
@@ -81,7 +92,7 @@ class TinHorizon {
   void choose_parts(const std::vector<Position>& outline);
   void measure_near_ground();
   void fill(const Part& part);
-  void add(const Part& part, std::uint32_t edge);
+  void add(Filling& filling, std::uint32_t edge);
   static void keep(std::vector<Record>& records, const Record& record);
 
   const TinIndex& index_;

@@ -12,8 +12,11 @@
 #include "core/threads/parallel_for.h"
 #include "core/viewshed/grid_sight.h"
 #include "core/viewshed/part_sweep.h"
+#include "core/viewshed/tin_viewshed.h"
 #include "ingest/dem/dem.h"
+#include "ingest/dem/dem_windows.h"
 #include "ingest/dem/ground_placement.h"
+#include "ingest/mesh/mesh.h"
 #include "tests/support/dem_list.h"
 #include "tests/support/shared_data.h"
 #include "tests/support/temp_folder.h"
@@ -135,6 +138,32 @@ void expect_equal(const std::string& file, const DemOptions& options) {
   }
 }
 
+/// The same over the mesh of a scene, whose triangles are larger than its cells where they may be.
+void expect_equal_on_mesh(const std::string& file, const DemOptions& options) {
+  const Dem dem = read_dem({file}, options, {});
+  const CellMeasures cells = measure_cells(dem);
+  MeshOptions meshing;
+  meshing.max_error_m = 0.1 * std::min(cells.cell_x_m, cells.cell_y_m);
+  const Tin tin = mesh_samples(place_samples(dem), meshing, {}).tin;
+  const TinIndex index(tin);
+  GroundGrid grid(dem.columns, dem.rows, ground_placement(dem));
+  stand_on(index, grid);
+  const auto columns = static_cast<std::size_t>(grid.columns());
+  const std::size_t cells_of_all = columns * static_cast<std::size_t>(grid.rows());
+  std::vector<Seen> judged(cells_of_all), fast(cells_of_all);
+  for (const Eye& at : eyes_of(grid)) {
+    for (const auto& [eye_m, target_m] : {Heights{2, 0}, Heights{0, 1.5}, Heights{300, 0}}) {
+      const Position eye = grid.raised(at.column, at.row, eye_m);
+      judge_tin_viewshed(index, grid, eye, target_m, whole_window(grid), judged);
+      tin_viewshed(index, grid, eye, target_m, whole_window(grid), fast);
+      for (std::size_t i = 0; i < cells_of_all; ++i)
+        EXPECT_EQ(judged[i], fast[i])
+            << "eye over " << at.column << "," << at.row << " at " << eye_m << " m, target "
+            << target_m << " m: column " << i % columns << " row " << i / columns;
+    }
+  }
+}
+
 /// All rasters of ground in the collection: those of kListedDems, and copies, crops and large ones.
 std::vector<test::ListedDem> proved_dems() {
   std::vector<test::ListedDem> dems(test::kListedDems.begin(), test::kListedDems.end());
@@ -161,6 +190,16 @@ TEST_P(RealDems, SweepEqualsJudge) {
     options.earth = Earth::kFlat;
     expect_equal(window, options);
   }
+}
+
+TEST_P(RealDems, ViewshedOfAMeshEqualsItsJudge) {
+  const test::ListedDem& listed = GetParam();
+  SCARP_SHARED_OR_SKIP(dem, listed.file);
+  const test::TempFolder folder;
+  DemOptions options;
+  options.nodata = listed.nodata;
+  if (listed.flat) options.earth = Earth::kFlat;
+  expect_equal_on_mesh(window_of(dem, folder), options);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, RealDems, testing::ValuesIn(proved_dems()),
