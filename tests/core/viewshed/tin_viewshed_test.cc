@@ -61,6 +61,26 @@ std::vector<Position> eyes_over(const GroundGrid& samples) {
   return eyes;
 }
 
+/// Eyes over an enclosed void, and over the ground a hand's breadth beside its border.
+std::vector<Position> eyes_at_void(const TinIndex& index) {
+  std::vector<Position> eyes;
+  const auto edges = index.hole_edges();
+  for (std::size_t i = 0; i < edges.size(); i += 1 + edges.size() / 4) {
+    const MeshEdge& edge = index.edges()[edges[i]];
+    const Position& a = index.tin().vertices[edge.from];
+    const Position& b = index.tin().vertices[edge.to];
+    const double dx = (b.x_m - a.x_m) / 30, dy = (b.y_m - a.y_m) / 30;
+    for (const double aside : {0.1, -4.0}) {  // ground lies on the left
+      Position eye{(a.x_m + b.x_m) / 2 - aside * dy, (a.y_m + b.y_m) / 2 + aside * dx, 0};
+      eye = round_to_lattice(eye);
+      const double ground_m = index.ground_height_m(eye.x_m, eye.y_m).value_or(a.z_m + 40);
+      eye.z_m = round_to_lattice(ground_m + 5);
+      eyes.push_back(eye);
+    }
+  }
+  return eyes;
+}
+
 /// Compares every sample with the judge. @return the share that the fast way left to it
 double compare(const TinIndex& index, const GroundGrid& samples, const Position& eye,
                double target_m, const SampleWindow& window) {
@@ -91,7 +111,9 @@ TEST(TinViewshed, EqualsItsJudgeOnAllReliefs) {
       GroundGrid between = samples_over(index, 57, 43);
       const double target_m = relief % 2 == 0 ? 3 : -1;
       for (GroundGrid* samples : {&vertices, &between}) {
-        for (const Position& eye : eyes_over(*samples)) {
+        std::vector<Position> eyes = eyes_over(*samples);
+        for (const Position& eye : eyes_at_void(index)) eyes.push_back(eye);
+        for (const Position& eye : eyes) {
           compare(index, *samples, eye, 0, whole_window(*samples));
           compare(index, *samples, eye, target_m, {2, 5, 9, 25});
           if (testing::Test::HasFailure()) return;
