@@ -402,7 +402,10 @@ void add_compare(CLI::App& app, CompareOptions& o, std::function<int()>& run) {
       "  scarp compare alps.scene -o alps-compared\n"
       "Of a DEM, in a square around its middle: viewsheds, least heights, horizons, meshes and\n"
       "groups, by every method and setting, GDAL and GRASS (where it is installed) among them,\n"
-      "against the exact judge. Of a scene: its groups, prepared anew with several settings.\n"
+      "against the exact judge; flights over the groups with every culling method; and time and\n"
+      "memory by size, of squares up to all of the DEM. Of a scene: its groups, prepared anew "
+      "with\n"
+      "several settings, and flights over them as they are.\n"
       "Writes compare.html (charts and tables), the charts as SVG, compare.csv and compare.json.\n"
       "What would not fit into the time is left out and named.");
   add_sources(*c, o.sources);

@@ -9,9 +9,11 @@
 #include "cli/commands.h"
 #include "cli/compare/compared_ground.h"
 #include "cli/compare/compared_page.h"
+#include "cli/compare/flight_job.h"
 #include "cli/compare/grass_peers.h"
 #include "cli/compare/groups_job.h"
 #include "cli/compare/jobs.h"
+#include "cli/compare/scale_job.h"
 #include "cli/loaded_scene.h"
 #include "cli/outputs.h"
 #include "cli/progress_bar.h"
@@ -27,10 +29,16 @@ namespace fs = std::filesystem;
 
 constexpr int kEyesOfViewsheds = 3;
 /// Facts that name jobs begin so.
-constexpr char kLeftOut[] = "left out: ";
+constexpr char kLeftOut[] = "left out: ", kNoTime[] = "for lack of time; give --time more";
 /// Groups of a DEM are those of a mesh with so many vertices at most: certifying is what takes
 /// time.
 constexpr std::uint32_t kMostVertices = 8'000;
+
+/// Of the time that is left: what measuring by size may take, and then groups, so that flights
+/// follow.
+constexpr double kScaleShare = 0.3, kGroupsShare = 0.7;
+/// Frames of each flight.
+constexpr int kFrames = 10;
 
 /// Sides of the square that is judged sample by sample, by the time that there is.
 std::int32_t side_within(double limit_s) {
@@ -92,13 +100,38 @@ class Comparing {
     return [this](const std::string& name) { return bar_.stage(name); };
   }
 
+  double left_s() const { return options_.limit_s - watch_.seconds(); }
+
   GroupsQuestion question() const {
     GroupsQuestion question;
     question.eyes = options_.eyes;
     question.heights_m = options_.heights_m;
     question.seed = options_.seed;
-    question.limit_s = options_.limit_s - watch_.seconds();
+    question.limit_s = kGroupsShare * left_s();
     return question;
+  }
+
+  /// Adds a job, or says why it is not there.
+  void add(const char* name, std::optional<ComparedJob> job, const std::string& why) {
+    if (job)
+      run_.jobs.push_back(*std::move(job));
+    else
+      run_.facts[kLeftOut + std::string(name)] = why;
+  }
+
+  void fly_over(const FlownGround& ground, const std::string& words, const std::string& commands,
+                const std::string& scene) {
+    FlightQuestion question;
+    question.routes = {"walk", "helicopter"};
+    question.frames = kFrames;
+    question.seed = options_.seed;
+    question.limit_s = left_s();
+    question.ground = words;
+    question.commands = commands;
+    question.scene = scene;
+    std::string why;
+    auto job = compare_flight(ground, question, bar_.stage("flight"), why);
+    add("flight", std::move(job), why);
   }
 
   void compare_scene(const std::string& path) {
@@ -110,6 +143,8 @@ class Comparing {
         compare_groups({scene.tin, scene.index, scene.frame, growth_of(scene.scene.description()),
                         "scarp build DEM -o S"},
                        question(), stages()));
+    fly_over(flown(scene), fmt::format("The scene's {} groups", scene.groups.leaf_count), "",
+             "'" + path + "'");
   }
 
   void compare_dem() {
@@ -132,7 +167,7 @@ class Comparing {
       if (watch_.seconds() < options_.limit_s)
         run_.jobs.push_back(job(bar_.stage(name)));
       else
-        run_.facts[kLeftOut + std::string(name)] = "for lack of time; give --time more";
+        run_.facts[kLeftOut + std::string(name)] = kNoTime;
     };
     compare("viewsheds",
             [&](const Progress& p) { return compare_viewsheds(ground, p, viewsheds); });
@@ -141,22 +176,39 @@ class Comparing {
       return compare_horizons(ground, options_.seed, p, horizons);
     });
     compare("meshes", [&](const Progress& p) { return compare_meshes(ground, p); });
-    compare("groups", [&](const Progress&) {
-      const Mesh mesh = mesh_samples(ground.samples, {.vertex_budget = kMostVertices}, {});
-      const TinIndex index(mesh.tin);
-      HiddenTogetherOptions growth;
-      growth.seed = options_.seed;
-      return compare_groups(
-          {mesh.tin, index, *ground.dem.frame, growth,
-           fmt::format("scarp build '{}' -o S --vertices {}{}", fmt::join(ground.files, "' '"),
-                       kMostVertices, ground.surface_flags)},
-          question(), stages());
-    });
+    std::string no_scale = kNoTime;
+    ScaleQuestion scale{options_.sources, options_.dem, options_.seed, kScaleShare * left_s(),
+                        options_.common.memory_budget_bytes};
+    auto by_size = compare_scale(scale, bar_.stage("scale"), no_scale);
+    add("scale", std::move(by_size), no_scale);
+    compare_groups_and_fly(ground);
     if (!grass)
       for (ComparedJob& job : run_.jobs)
         for (const auto& [name, program] :
              {std::pair("viewshed", "r.viewshed"), std::pair("horizon", "r.horizon")})
           if (job.name == name) job.left_out.push_back(fmt::format("{}: {}", program, why));
+  }
+
+  /// Groups of a mesh, prepared in several ways; and then flights over them.
+  void compare_groups_and_fly(const ComparedGround& ground) {
+    if (left_s() <= 0) {
+      for (const char* name : {"groups", "flight"}) add(name, {}, kNoTime);
+      return;
+    }
+    const Mesh mesh = mesh_samples(ground.samples, {.vertex_budget = kMostVertices}, {});
+    const TinIndex index(mesh.tin);
+    HiddenTogetherOptions growth;
+    growth.seed = options_.seed;
+    const std::string build =
+        fmt::format("scarp build '{}' -o S --vertices {}{}", fmt::join(ground.files, "' '"),
+                    kMostVertices, ground.surface_flags);
+    Groups groups;
+    run_.jobs.push_back(compare_groups({mesh.tin, index, *ground.dem.frame, growth, build},
+                                       question(), stages(), &groups));
+    if (groups.leaf_count == 0) return add("flight", {}, kNoTime);
+    fly_over({mesh.tin, index, groups, *ground.dem.frame, !groups.nodes.empty(), "the square"},
+             fmt::format("The square's {} groups", groups.leaf_count),
+             build + " --horizon both && ", "S");
   }
 
   const CompareOptions& options_;

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "cli/commands.h"
+#include "cli/fly/contenders.h"
 #include "cli/fly/flight.h"
 #include "cli/fly/flight_page.h"
 #include "cli/fly/flight_path.h"
@@ -16,184 +17,14 @@
 #include "cli/loaded_scene.h"
 #include "cli/outputs.h"
 #include "cli/progress_bar.h"
-#include "cli/scene_culling.h"
-#include "cli/stopwatch.h"
-#include "core/culling/box_tree.h"
-#include "core/culling/cell_culling.h"
-#include "core/culling/certified_hiding.h"
-#include "core/culling/image_culling.h"
-#include "core/culling/joint_hiding.h"
-#include "core/culling/mask_culling.h"
-#include "core/culling/object_tiles.h"
-#include "core/culling/occluder_hiding.h"
-#include "core/culling/query_culling.h"
-#include "core/culling/swept_culling.h"
 #include "core/error/error.h"
-#include "core/occlusion/virtual_occluders.h"
 #include "tiles/layers/png_image.h"
 #include "tiles/store/part_folder.h"
 
 namespace scarp {
 namespace {
 
-/// Everything in the picture: what a scene without culling draws.
-class EverythingInView : public CullingMethod {
- public:
-  explicit EverythingInView(std::uint32_t groups) {
-    for (GroupIndex g = 0; g < groups; ++g) all_.visible_groups.push_back(g);
-  }
-  std::string_view name() const override { return "frustum"; }
-  CullingAnswer visible(const Camera&) override { return all_; }
-  bool set_present(std::span<const std::uint8_t> is_present) override {
-    all_.visible_groups.clear();
-    for (GroupIndex g = 0; g < is_present.size(); ++g)
-      if (is_present[g]) all_.visible_groups.push_back(g);
-    return true;
-  }
-
- private:
-  CullingAnswer all_;
-};
-
 constexpr char kPageName[] = "flight.html";
-constexpr float kSmallGapOpacity = 0.7F;
-
-/// Of the triangles in view that hom draws as occluders.
-constexpr double kEstimateShare = 0.25;
-
-/// What methods are made from; some of them share it.
-struct Prepared {
-  GroupBatches batches;
-  BoxTree tree;
-  /// What queries ask for, where one of them flies: groups, large ones in tiles, and their levels.
-  ObjectTiles tiles;
-  std::optional<GroupBatches> tile_batches;
-  std::optional<CoarseBatches> coarse;
-  double tiles_s = 0, coarse_s = 0;  ///< to cut, and then to make the levels
-
-  Prepared(const LoadedScene& scene, bool with_tiles, bool with_coarse)
-      : batches(scene.tin, scene.groups), tree(batches) {
-    const ProcessorStopwatch watch;
-    if (with_tiles || with_coarse) {
-      tiles = cut_into_tiles(scene.tin, scene.groups);
-      tile_batches.emplace(scene.tin, tiles.tiles);
-    }
-    tiles_s = watch.seconds();
-    if (with_coarse) coarse.emplace(*tile_batches, query_shares());
-    coarse_s = watch.seconds();
-  }
-
-  static std::vector<double> query_shares() {
-    return {std::begin(kQueryShares), std::end(kQueryShares)};
-  }
-};
-
-bool is_wanted(const std::vector<std::string>& wanted, const std::string& method) {
-  return wanted.empty() || std::find(wanted.begin(), wanted.end(), method) != wanted.end();
-}
-
-/// Cells of view, the smallest an eighth as wide as the mean group is.
-std::vector<CellSpace> cells_of_view(const LoadedScene& scene) {
-  const Bounds ground = bounds_of(scene.tin.vertices);
-  const double area_m2 = (ground.high.x_m - ground.low.x_m) * (ground.high.y_m - ground.low.y_m);
-  return walk_and_flight(scene.tin, std::sqrt(area_m2 / std::max(1U, scene.groups.leaf_count)) / 8);
-}
-
-/// Virtual occluders, where a method that asks for them flies.
-struct SectionsOfScene {
-  std::vector<UprightOccluder> sections;
-  double prepare_s = 0;
-
-  SectionsOfScene(const Tin& tin, bool are_wanted) {
-    if (!are_wanted) return;
-    const ProcessorStopwatch watch;
-    sections = find_virtual_occluders(tin, {}).sections;
-    prepare_s = watch.seconds();
-  }
-
-  std::uint64_t bytes() const {
-    std::uint64_t bytes = 0;
-    for (const UprightOccluder& section : sections) bytes += section.bytes();
-    return bytes;
-  }
-};
-
-std::vector<Contender> contenders_of(const LoadedScene& scene, const Prepared& prepared,
-                                     const std::vector<std::string>& wanted) {
-  const GroupBatches& batches = prepared.batches;
-  std::vector<Contender> all;
-  const auto add = [&](const std::string& label, bool is_conservative, double prepare_s,
-                       std::uint64_t bytes, auto make) {
-    if (is_wanted(wanted, label)) all.push_back({label, is_conservative, prepare_s, bytes, make()});
-  };
-  add("frustum", true, 0, 0,
-      [&] { return std::make_unique<EverythingInView>(scene.groups.leaf_count); });
-  for (const char* method : {"thesis", "certified"}) {
-    const bool is_certified = std::string(method) == "certified";
-    if (is_certified ? scene.groups.has_certified() : has_horizons(scene.scene))
-      add(method, is_certified, NAN, region_bytes(scene.groups, method),
-          [&] { return culling_method(scene, method); });
-  }
-  if (scene.groups.has_certified() && is_wanted(wanted, "swept")) {
-    auto swept = std::make_unique<SweptCulling>(scene.groups.certified, batches);
-    const std::size_t bytes = region_bytes(scene.groups, "certified") + swept->bytes();
-    add("swept", true, NAN, bytes, [&] { return std::move(swept); });
-  }
-  add("hzb", true, 0, 0, [&] { return std::make_unique<HzbCulling>(scene.tin, batches); });
-  add("mask", false, 0, 0,
-      [&] { return std::make_unique<MaskCulling>(scene.tin, batches, prepared.tree); });
-  const SectionsOfScene sections(scene.tin,
-                                 is_wanted(wanted, "cells") || is_wanted(wanted, "law-tan"));
-  const auto by_occluders = [&] {
-    return std::make_unique<OccluderHiding>(prepared.tree, batches, scene.tin, sections.sections);
-  };
-  const auto cells = [&](const char* label, std::unique_ptr<NodeHiding> hiding) {
-    return std::make_unique<CellCulling>(label, std::move(hiding), cells_of_view(scene));
-  };
-  if (scene.groups.has_certified())
-    add("cells", true, sections.prepare_s, sections.bytes(), [&] {
-      auto by_regions = std::make_unique<CertifiedHiding>(prepared.tree, scene.groups.certified);
-      return cells("cells", std::make_unique<JointHiding>(std::move(by_regions), by_occluders()));
-    });
-  add("law-tan", true, sections.prepare_s, sections.bytes(),
-      [&] { return cells("law-tan", by_occluders()); });
-  MaskOptions plain;
-  plain.drawing = MaskDrawing::kByCentres;
-  add("mask-plain", false, 0, 0,
-      [&] { return std::make_unique<MaskCulling>(scene.tin, batches, prepared.tree, plain); });
-  ImageCullingOptions hom;
-  const auto add_hom = [&](const char* label, DepthTest depth) {
-    add(label, false, 0, 0, [&] { return std::make_unique<HomCulling>(batches, depth, hom); });
-  };
-  hom.occluder_share = kEstimateShare;
-  add_hom("hom", DepthTest::kEstimate);
-  hom.occluder_share = 1;
-  add_hom("hybrid", DepthTest::kPyramid);
-  hom.opacity = kSmallGapOpacity;
-  add_hom("hom-0.7", DepthTest::kPyramid);
-  add("volume-scan", false, 0, 0, [&] { return std::make_unique<VolumeScanCulling>(batches); });
-  const auto in_tiles = [&](std::unique_ptr<CullingMethod> method) {
-    return std::make_unique<TiledCulling>(prepared.tiles, std::move(method));
-  };
-  if (prepared.coarse)
-    for (const QueryUse use : {QueryUse::kSameFrame, QueryUse::kNextFrame})
-      add(use == QueryUse::kSameFrame ? "lod-query" : "multi-frame", false, prepared.coarse_s,
-          prepared.coarse->bytes(), [&] {
-            return in_tiles(
-                std::make_unique<QueryCulling>(*prepared.tile_batches, *prepared.coarse, use));
-          });
-  if (prepared.tile_batches)
-    add("stop-and-wait", false, prepared.tiles_s, 0,
-        [&] { return in_tiles(std::make_unique<StopAndWaitCulling>(*prepared.tile_batches)); });
-  for (const std::string& name : wanted)
-    if (std::none_of(all.begin(), all.end(), [&](const Contender& c) { return c.label == name; }))
-      throw Error(ErrorCode::kInput,
-                  fmt::format("--methods {}: the scene '{}' was built without it; build with "
-                              "--horizon both, or leave it out",
-                              name, scene.scene.path()));
-  return all;
-}
-
 /// Where the scene changes, methods that prepared for it cannot follow.
 void keep_those_that_follow(const LoadedScene& scene, std::vector<Contender>& contenders,
                             const std::vector<std::string>& wanted) {
@@ -207,13 +38,6 @@ void keep_those_that_follow(const LoadedScene& scene, std::vector<Contender>& co
                               contender.label));
     return true;
   });
-}
-
-Route route_of(const std::string& name) {
-  if (name == "street") return Route::kStreet;
-  if (name == "walk") return Route::kWalk;
-  if (name == "drive") return Route::kDrive;
-  return name == "helicopter" ? Route::kHelicopter : Route::kAirliner;
 }
 
 /// The frames that are kept as pictures: evenly spread.
@@ -333,12 +157,11 @@ int run_fly(const FlyOptions& options) {
   PartFolder folder(options.output, kPageName, existing(options.common));
   const std::vector<Waypoint> path =
       options.path_file.empty()
-          ? find_path(scene, route_of(options.route), options.frames, options.seed)
+          ? find_path(flown(scene), route_of(options.route), options.frames, options.seed)
           : read_path(options.path_file);
-  const Prepared prepared(
-      scene, is_wanted(options.methods, "stop-and-wait"),
-      is_wanted(options.methods, "lod-query") || is_wanted(options.methods, "multi-frame"));
-  std::vector<Contender> contenders = contenders_of(scene, prepared, options.methods);
+  const FlownGround ground = flown(scene);
+  const Prepared prepared(ground, options.methods);
+  std::vector<Contender> contenders = contenders_of(ground, prepared, options.methods);
   if (options.changes > 0) keep_those_that_follow(scene, contenders, options.methods);
 
   Lens lens;

@@ -79,7 +79,8 @@ class GroupsComparison {
                    const StageProgress& stage)
       : scene_(scene), options_(question), stage_(stage) {}
 
-  ComparedJob run() {
+  ComparedJob run(Groups* prepared) {
+    prepared_ = prepared;
     grow();
     judge();
     run_thesis();
@@ -261,6 +262,7 @@ class GroupsComparison {
       return false;
     }
     const Groups groups = prepare(setting, progress);
+    if (prepared_ != nullptr) keep(setting, groups);
     if (setting.thesis) {
       setting.bytes_per_triangle = bytes_a_triangle(region_bytes(groups, "thesis"));
       ThesisCulling culling(groups);
@@ -272,6 +274,20 @@ class GroupsComparison {
     }
     done_.push_back(setting);
     return true;
+  }
+
+  /// Keeps what a build would make: the regions of either kind that it would, or others where there
+  /// are none yet.
+  void keep(const Setting& setting, const Groups& groups) const {
+    if (setting.partition != &crystals_) return;
+    prepared_->group_of_triangle = groups.group_of_triangle;
+    prepared_->leaf_count = groups.leaf_count;
+    if (setting.certified && (setting.is_default || !prepared_->has_certified()))
+      prepared_->certified = groups.certified;
+    if (setting.thesis && (*setting.thesis == SectorLayout{} || prepared_->nodes.empty())) {
+      prepared_->nodes = groups.nodes;
+      prepared_->regions = groups.regions;
+    }
   }
 
   /// Spends what time is left on the spread of times.
@@ -369,6 +385,7 @@ class GroupsComparison {
   const StageProgress& stage_;
   Stopwatch watch_;
   Partition crystals_, squares_;
+  Groups* prepared_ = nullptr;  // null: nobody wants them
   std::vector<TriangleIndex> all_triangles_;
   std::vector<JudgedEye> eyes_;
   std::vector<Setting> done_, left_out_;
@@ -377,8 +394,8 @@ class GroupsComparison {
 }  // namespace
 
 ComparedJob compare_groups(const CulledGround& ground, const GroupsQuestion& question,
-                           const StageProgress& stage) {
-  return GroupsComparison(ground, question, stage).run();
+                           const StageProgress& stage, Groups* prepared) {
+  return GroupsComparison(ground, question, stage).run(prepared);
 }
 
 }  // namespace scarp

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cli/compare/compared_job.h"
+#include "core/occlusion/groups.h"
 #include "core/occlusion/hidden_together.h"
 #include "core/sight/tin_index.h"
 #include "core/terrain/tin.h"
@@ -35,7 +36,10 @@ using StageProgress = std::function<Progress(const std::string& stage)>;
 
 /// What regions cull of groups that were grown once, by the published and the certified method,
 /// against what preparing and keeping them costs. The exact judge counts.
+/// @param prepared[out]  if wanted: the groups as scarp build --horizon both would leave them, as
+/// far
+///   as there was time for either kind of regions
 ComparedJob compare_groups(const CulledGround& ground, const GroupsQuestion& question,
-                           const StageProgress& stage);
+                           const StageProgress& stage, Groups* prepared = nullptr);
 
 }  // namespace scarp

@@ -13,6 +13,7 @@
 #include "core/occlusion/splitmix64.h"
 
 namespace scarp {
+
 namespace {
 
 constexpr char kHeader[] = "x,y,height_m,azimuth_deg,pitch_deg";
@@ -119,6 +120,13 @@ double mean_height_m(const Tin& tin) {
 
 }  // namespace
 
+Route route_of(const std::string& name) {
+  if (name == "street") return Route::kStreet;
+  if (name == "walk") return Route::kWalk;
+  if (name == "drive") return Route::kDrive;
+  return name == "helicopter" ? Route::kHelicopter : Route::kAirliner;
+}
+
 std::vector<Waypoint> read_path(const std::string& file) {
   std::ifstream in(file);
   std::string text;
@@ -151,20 +159,20 @@ std::string to_csv(const std::vector<Waypoint>& path) {
   return csv;
 }
 
-std::vector<Waypoint> find_path(const LoadedScene& scene, Route route, int frames,
+std::vector<Waypoint> find_path(const FlownGround& ground, Route route, int frames,
                                 std::uint64_t seed) {
   const Travel travel = travel_of(route);
   std::vector<PlanPoint> points = route == Route::kAirliner
-                                      ? straight_way(bounds_of(scene.tin.vertices), seed)
-                                  : route == Route::kStreet ? street_way(scene.index, seed)
-                                                            : valley_way(scene.index, seed);
+                                      ? straight_way(bounds_of(ground.tin.vertices), seed)
+                                  : route == Route::kStreet ? street_way(ground.index, seed)
+                                                            : valley_way(ground.index, seed);
   if (points.size() < 2)
     throw Error(ErrorCode::kInput,
                 fmt::format("'{}': has no two places of ground that are connected; give --path",
-                            scene.scene.path()));
+                            ground.name));
   const Way way(std::move(points));
-  const GeoFrame::Placer placer(scene.frame);
-  const double mean_m = mean_height_m(scene.tin);
+  const GeoFrame::Placer placer(ground.frame);
+  const double mean_m = mean_height_m(ground.tin);
   std::vector<Waypoint> path;
   for (int i = 0; i < frames; ++i) {
     const double along_m = i * travel.step_m;
@@ -172,7 +180,7 @@ std::vector<Waypoint> find_path(const LoadedScene& scene, Route route, int frame
     const PlanPoint at = way.at(along_m);
     const PlanPoint ahead = way.at(std::min(along_m + travel.look_ahead_m, way.length_m()));
     Position p = round_to_lattice(Position{at.x_m, at.y_m, 0});
-    const auto ground_m = scene.index.ground_height_m(p.x_m, p.y_m);
+    const auto ground_m = ground.index.ground_height_m(p.x_m, p.y_m);
     if (route == Route::kAirliner)
       p.z_m = mean_m + travel.above_m;
     else if (ground_m)

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/loaded_scene.h"
+#include "cli/fly/flown_ground.h"
 #include "core/culling/camera.h"
 
 namespace scarp {
@@ -25,6 +25,9 @@ enum class Route {
   kAirliner,    ///< 10 km above the mean ground, straight across, 250 m a frame
 };
 
+/// A kind by its name. Requires street, walk, drive, helicopter or airliner.
+Route route_of(const std::string& name);
+
 /// Reads a path: a line "x,y,height_m,azimuth_deg,pitch_deg", then a line a frame, in the CRS of
 /// the scene, heights above its datum. Throws Error{kInput} that names the line.
 std::vector<Waypoint> read_path(const std::string& file);
@@ -33,8 +36,8 @@ std::string to_csv(const std::vector<Waypoint>& path);
 
 /// Finds a path of a kind: the same seed finds the same one. As many frames as were asked for, or
 /// fewer where the way ends earlier.
-/// Throws Error{kInput} where the scene has no ground to go along.
-std::vector<Waypoint> find_path(const LoadedScene& scene, Route route, int frames,
+/// Throws Error{kInput} where there is no ground to go along.
+std::vector<Waypoint> find_path(const FlownGround& ground, Route route, int frames,
                                 std::uint64_t seed);
 
 /// The picture that is taken at a waypoint.

@@ -19,15 +19,17 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "cli/compare/compared_ground.h"
 #include "cli/compare/compared_page.h"
+#include "cli/compare/flight_job.h"
 #include "cli/compare/grass_peers.h"
 #include "cli/compare/groups_job.h"
 #include "cli/compare/jobs.h"
+#include "cli/compare/scale_job.h"
+#include "cli/loaded_scene.h"
 #include "cli/stopwatch.h"
 #include "core/error/error.h"
 #include "core/threads/parallel_for.h"
@@ -51,6 +53,10 @@ constexpr int kRuns = 3;
 struct Options {
   std::string output, scale = "0.1,1,10", only;
   bool keep = false, check = false;
+
+  bool wants(const std::string& job) const {
+    return only.empty() || only.find(fmt::format(",{},", job)) != std::string::npos;
+  }
 };
 
 Options parse(int argc, char** argv) {
@@ -85,111 +91,26 @@ void run(const std::string& line) {
     throw Error(ErrorCode::kResource, fmt::format("'{}' failed", line));
 }
 
-/// Frames of a flight, method by method.
-struct FlightSum {
-  std::vector<double> find_ms, frame_ms;   // of each frame
-  double drawn_of_visible = 0, wrong = 0;  // sums over the frames
-};
-
-/// Adds what a flight's frames.csv says.
-void add_frames(const std::string& path, std::map<std::string, FlightSum>& sums) {
-  std::ifstream csv(path);
-  std::string line;
-  std::getline(csv, line);
-  const auto cells_of = [](const std::string& text) {
-    std::vector<std::string> cells;
-    std::istringstream list(text);
-    for (std::string cell; std::getline(list, cell, ',');) cells.push_back(cell);
-    return cells;
-  };
-  const std::vector<std::string> names = cells_of(line);
-  const auto column = [&](const std::string& name) {
-    const auto at = std::find(names.begin(), names.end(), name);
-    if (at == names.end())
-      throw Error(ErrorCode::kCorrupt, fmt::format("frames.csv: no column '{}'", name));
-    return static_cast<std::size_t>(at - names.begin());
-  };
-  while (std::getline(csv, line)) {
-    const std::vector<std::string> cells = cells_of(line);
-    const auto number = [&](const char* name) { return std::stod(cells[column(name)]); };
-    FlightSum& sum = sums[cells[column("method")]];
-    sum.find_ms.push_back(number("find_ms"));
-    sum.frame_ms.push_back(number("find_ms") + number("draw_ms"));
-    sum.drawn_of_visible += number("drawn") / std::max(1.0, number("in_visible_groups"));
-    sum.wrong += number("wrong_px_x1");
-  }
-}
-
-/// The median of values, and those that a tenth of them is below and above.
-void add_spread(ComparedPoint& point, const std::string& figure, std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  point.figures[figure] = values[n / 2];
-  point.figures[figure + "_least"] = values[n / 10];
-  point.figures[figure + "_most"] = values[n - 1 - n / 10];
-}
-
-ComparedJob compare_flight(const std::string& scarp, const std::string& dem,
-                           const test::TempFolder& folder) {
-  ComparedJob job;
-  job.name = "flight";
-  job.title = "Wrong pixels of flights, and what they gain";
-  job.notes = {
-      "Big Tujunga with 20,000 vertices, 640 pixels wide: 20 frames at 2 m along a valley, 20 at "
-      "100 m above it, 20 of an airliner.",
-      "Lines leave out the fastest and the slowest tenth of the frames."};
-  constexpr char kWrong[] = "wrong pixels a frame";
-  constexpr char kDrawn[] = "triangles drawn, of those in groups that are seen, mean of the frames";
-  constexpr char kFrame[] = "milliseconds a frame, finding and drawing, median";
-  job.charts = {
-      {"frame_ms", kFrame, "wrong_pixels", kWrong, ""},
-      {"drawn_of_visible", kDrawn, "wrong_pixels", kWrong, ""},
-      {"find_ms", "milliseconds to find what is visible, median", "drawn_of_visible", kDrawn, ""}};
-  const std::string scene = folder.path("s.scene");
-  const std::string build =
-      fmt::format("scarp build '{}' -o S --vertices 20000 --horizon both", dem);
+ComparedJob fly_over_bigtujunga(const std::string& scarp, const std::string& dem,
+                                const test::TempFolder& folder) {
+  const std::string path = folder.path("s.scene");
   run(fmt::format("'{}' build '{}' -o '{}' --vertices 20000 --horizon both > /dev/null", scarp, dem,
-                  scene));
-  std::map<std::string, FlightSum> sums;
-  for (const char* route : {"walk", "helicopter", "airliner"}) {
-    const std::string out = folder.path(route);
-    run(fmt::format(
-        "'{}' fly '{}' --route {} --frames 20 --seed {} --pictures 0 -o '{}' > /dev/null", scarp,
-        scene, route, kSeed, out));
-    add_frames(out + "/frames.csv", sums);
-  }
-  for (auto& [method, sum] : sums) {
-    const auto frames = static_cast<double>(sum.find_ms.size());
-    ComparedPoint point{
-        method,
-        method,
-        {},
-        method == "certified",
-        false,
-        sum.wrong > 0,
-        fmt::format("{} && for route in walk helicopter airliner; do scarp fly S --route $route "
-                    "--frames 20 --seed {} --methods {} -o $route; done",
-                    build, kSeed, method)};
-    point.figures = {{"drawn_of_visible", sum.drawn_of_visible / frames},
-                     {"wrong_pixels", sum.wrong / frames}};
-    add_spread(point, "find_ms", std::move(sum.find_ms));
-    add_spread(point, "frame_ms", std::move(sum.frame_ms));
-    job.points.push_back(std::move(point));
-  }
-  return job;
+                  path));
+  const LoadedScene scene(path, {});
+  FlightQuestion question;
+  question.routes = {"walk", "helicopter", "airliner"};
+  question.seed = kSeed;
+  question.limit_s = HUGE_VAL;
+  question.ground = "Big Tujunga with 20,000 vertices";
+  question.commands = fmt::format("scarp build '{}' -o S --vertices 20000 --horizon both && ", dem);
+  question.scene = "S";
+  std::string why;
+  auto job = compare_flight(flown(scene), question, {}, why);
+  if (!job) throw Error(ErrorCode::kResource, "no flight: " + why);
+  return *std::move(job);
 }
 
-/// Slope of a line through the logarithms of points.
-double fitted_exponent(std::span<const ComparedPoint> points, const std::string& figure) {
-  double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
-  for (const ComparedPoint& p : points) {
-    const double x = std::log(p.figures.at("samples")), y = std::log(p.figures.at(figure));
-    n += 1, sx += x, sy += y, sxx += x * x, sxy += x * y;
-  }
-  return (n * sxy - sx * sy) / (n * sxx - sx * sx);
-}
-
-ComparedJob compare_scale(const std::string& bench, const std::string& millions,
+ComparedJob build_by_size(const std::string& bench, const std::string& millions,
                           const test::TempFolder& folder) {
   ComparedJob job;
   job.name = "scale";
@@ -254,7 +175,7 @@ ComparedRun measure(const Options& options, const std::string& dem, const fs::pa
   all.facts["input " + fs::path(dem).filename().string()] =
       fmt::format("{} bytes, XXH3-128 {}", digest.size, to_hex(digest.checksum));
   const auto compare = [&](const std::string& job, const auto& run_job) {
-    if (!options.only.empty() && options.only.find("," + job + ",") == std::string::npos) return;
+    if (!options.wants(job)) return;
     fmt::print(stderr, "{}\n", job);
     all.jobs.push_back(run_job());
   };
@@ -270,11 +191,12 @@ ComparedRun measure(const Options& options, const std::string& dem, const fs::pa
     return compare_groups({mesh.tin, index, *ground.dem.frame, {}, build}, {},
                           [](const std::string&) { return Progress([](double) {}); });
   });
-  compare("flight",
-          [&] { return compare_flight((programs.parent_path() / "scarp").string(), dem, folder); });
+  compare("flight", [&] {
+    return fly_over_bigtujunga((programs.parent_path() / "scarp").string(), dem, folder);
+  });
   if (!options.scale.empty())
     compare("scale", [&] {
-      return compare_scale((programs / "scale_bench").string(), options.scale, folder);
+      return build_by_size((programs / "scale_bench").string(), options.scale, folder);
     });
   name_commands(all);
   const auto without_folder = [&](std::string& text) {
@@ -379,6 +301,13 @@ Worse compare_with_kept(const json& kept, const json& now) {
   return worse;
 }
 
+/// What is kept of the jobs that are wanted.
+json kept_of_wanted(json kept, const Options& options) {
+  for (const auto& [job, time] : kKeptTimes)
+    if (!options.wants(job)) kept.erase(job);
+  return kept;
+}
+
 /// @return how many points became worse
 std::size_t say(const Worse& worse) {
   for (const auto* lines : {&worse.missing, &worse.slower, &worse.less_accurate})
@@ -420,7 +349,8 @@ int main(int argc, char** argv) try {
     std::ofstream(kept_file) << now.dump(1) << '\n';
   }
   if (options.check) {
-    const nlohmann::json kept = nlohmann::json::parse(std::ifstream(kept_file));
+    const nlohmann::json kept =
+        kept_of_wanted(nlohmann::json::parse(std::ifstream(kept_file)), options);
     Worse worse = compare_with_kept(kept, now);
     for (int run = 1; run < kRuns && !worse.slower.empty(); ++run) {
       take_lesser_times(now, kept_of(measure(again, *dem, programs)));

@@ -14,6 +14,7 @@
 #include "cli/compare/compared_job.h"
 #include "cli/compare/compared_page.h"
 #include "cli/compare/job_chart.h"
+#include "cli/compare/scale_job.h"
 #include "tests/support/run_scarp.h"
 #include "tests/support/temp_folder.h"
 
@@ -25,12 +26,13 @@ using test::run_scarp;
 using test::RunResult;
 
 /// Ridges and valleys without a CRS.
-void write_hills(const std::string& path) {
-  std::ofstream file(path);
-  file << "ncols 24\nnrows 24\nxllcorner 0\nyllcorner 0\ncellsize 100\n";
-  for (int r = 0; r < 24; ++r, file << '\n')
-    for (int c = 0; c < 24; ++c)
-      file << std::round(200 + 150 * std::sin(0.9 * c + 0.2 * r) + 40 * std::cos(0.7 * r)) << ' ';
+std::string hills(int columns, int rows) {
+  std::ostringstream text;
+  text << "ncols " << columns << "\nnrows " << rows << "\nxllcorner 0\nyllcorner 0\ncellsize 100\n";
+  for (int r = 0; r < rows; ++r, text << '\n')
+    for (int c = 0; c < columns; ++c)
+      text << std::round(200 + 150 * std::sin(0.9 * c + 0.2 * r) + 40 * std::cos(0.7 * r)) << ' ';
+  return text.str();
 }
 
 /// Other programs take seconds to start.
@@ -45,7 +47,7 @@ class CompareCommand : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new test::TempFolder;
-    write_hills(folder_->path("hills.asc"));
+    std::ofstream(folder_->path("hills.asc")) << hills(24, 24);
     scene_ = folder_->path("hills.scene");
     const RunResult built =
         run_scarp("$SCARP build " + folder_->path("hills.asc") + " -o " + scene_ +
@@ -109,13 +111,33 @@ void expect_whole_page(const std::string& folder, const json& result) {
   expect_same_figures(read_text(folder + "/compare.csv"), result);
 }
 
+/// Every method flew, and those that promise it show no pixel that an exact ray calls wrong.
+void expect_a_flight(const json& job) {
+  ASSERT_EQ(job["name"], "flight");
+  std::set<std::string> methods;
+  for (const json& point : job["points"]) {
+    const json& figures = point["figures"];
+    methods.insert(point["method"]);
+    EXPECT_GT(figures["triangles"], 0) << point;
+    EXPECT_EQ(point["unsafe"].get<bool>(), figures["judged_wrong_pixels"] > 0) << point;
+    for (const char* promises : {"frustum", "certified", "swept", "cells", "law-tan", "hzb"})
+      if (point["method"] == promises) {
+        EXPECT_EQ(figures["judged_wrong_pixels"], 0) << point;
+        EXPECT_GE(figures["drawn_of_visible"].get<double>(), 1 - 1e-9) << point;
+      }
+  }
+  for (const char* method : {"frustum", "certified", "swept", "hzb", "lod-query", "stop-and-wait"})
+    EXPECT_EQ(methods.count(method), 1U) << method;
+}
+
 TEST_F(CompareCommand, ChartsBothMethodsOfASceneAndCertifiedIsNeverWrong) {
   const std::string out = folder_->path("compared");
-  const RunResult run =
-      run_scarp("$SCARP compare " + scene_ + " -o " + out + " --eyes 2 --heights 2,300 --json");
+  const RunResult run = run_scarp("$SCARP compare " + scene_ + " -o " + out +
+                                  " --eyes 2 --heights 2,300 --time 60min --json");
   ASSERT_EQ(run.exit_code, 0) << run.errors;
   const json result = json::parse(run.output);
-  ASSERT_EQ(result["jobs"].size(), 1U);
+  ASSERT_EQ(result["jobs"].size(), 2U);
+  expect_a_flight(result["jobs"][1]);
   const json& job = result["jobs"][0];
   std::set<std::string> defaults;
   for (const json& point : job["points"]) {
@@ -142,13 +164,14 @@ TEST_F(CompareCommand, ChartsBothMethodsOfASceneAndCertifiedIsNeverWrong) {
 TEST_F(CompareCommand, OfADemEveryJobIsThereAndWhatIsExactIsNeverWrong) {
   const std::string out = folder_->path("dem");
   const RunResult run = run_scarp(kWithoutGrass + "$SCARP compare " + folder_->path("hills.asc") +
-                                  " -o " + out + " --eyes 1 --heights 2 --time 50s --json");
+                                  " -o " + out + " --eyes 1 --heights 2 --time 60min --json");
   ASSERT_EQ(run.exit_code, 0) << run.errors;
   const json result = json::parse(run.output);
   std::map<std::string, json> jobs;
   for (const json& job : result["jobs"]) jobs[job["name"]] = job;
-  for (const char* name : {"viewshed", "heights", "horizon", "mesh", "groups"})
+  for (const char* name : {"viewshed", "heights", "horizon", "mesh", "groups", "flight", "scale"})
     ASSERT_TRUE(jobs.contains(name)) << name;
+  expect_a_flight(jobs["flight"]);
   EXPECT_EQ(point_of(jobs["viewshed"], "scarp", "exact")["figures"]["wrong_percent"], 0);
   EXPECT_GT(point_of(jobs["viewshed"], "gdal_viewshed", "edge")["figures"]["wrong_percent"], 0);
   EXPECT_LT(point_of(jobs["heights"], "scarp", "exact")["figures"]["mean_error_m"], 1e-3);
@@ -198,6 +221,62 @@ TEST_F(CompareCommand, RefusalsAreOneLineAndLeaveNothingBehind) {
   }
   EXPECT_EQ(read_text(taken + "/compare.csv"), "mine");
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(taken), {}), 1);
+}
+
+/// Time and memory differ from run to run; what is measured, of what, and what is said does not.
+TEST(CompareScale, HalvesTheSideDownFromTheWholeDemAndFitsTheLargestSizes) {
+  const test::TempFolder folder;
+  std::ofstream(folder.path("wide.asc")) << hills(80, 50);
+  ScaleQuestion question;
+  question.files = {folder.path("wide.asc")};
+  std::string why;
+  const auto job = compare_scale(question, {}, why);
+  ASSERT_TRUE(job) << why;
+  std::map<std::string, std::vector<double>> samples;
+  for (const ComparedPoint& p : job->points) {
+    samples[p.method].push_back(p.figures.at("samples"));
+    EXPECT_GT(p.figures.at(p.method + "_seconds"), 0);
+    EXPECT_NE(p.command.find("wide.asc"), std::string::npos) << p.command;
+    EXPECT_EQ(p.command.starts_with("gdal_translate"), p.figures.at("samples") < 80 * 50);
+  }
+  for (const char* work : {"viewshed", "horizons", "mesh"})
+    EXPECT_EQ(samples[work], (std::vector<double>{20 * 20, 40 * 40, 80 * 50})) << work;
+  EXPECT_TRUE(job->left_out.empty());
+  std::size_t exponents = 0;
+  for (const std::string& note : job->notes)
+    exponents += note.find("grows as samples to the power of") != std::string::npos;
+  EXPECT_EQ(exponents, 3U);
+}
+
+TEST(CompareScale, LeavesOutWhatWouldNotFit) {
+  const test::TempFolder folder;
+  std::ofstream(folder.path("hills.asc")) << hills(80, 80);
+  ScaleQuestion question;
+  question.files = {folder.path("hills.asc")};
+  question.memory_bytes = 500'000;  // 40 x 40 samples, not 80 x 80
+  std::string why;
+  const auto job = compare_scale(question, {}, why);
+  ASSERT_TRUE(job) << why;
+  for (const ComparedPoint& p : job->points) EXPECT_LE(p.figures.at("samples"), 40 * 40);
+  ASSERT_EQ(job->left_out.size(), 1U);
+  EXPECT_NE(job->left_out[0].find("memory"), std::string::npos) << job->left_out[0];
+  for (const std::string& note : job->notes) EXPECT_EQ(note.find("power"), std::string::npos);
+  question.limit_s = 0;
+  EXPECT_FALSE(compare_scale(question, {}, why));
+  EXPECT_NE(why.find("time"), std::string::npos) << why;
+}
+
+TEST(CompareScale, FindsThePowerThatAFigureGrowsWith) {
+  std::vector<ComparedPoint> points;
+  for (const double samples : {1e3, 4e3, 2e5})
+    points.push_back({"m",
+                      "",
+                      {{"samples", samples}, {"s", 7 * std::pow(samples, 1.3)}},
+                      false,
+                      false,
+                      false,
+                      ""});
+  EXPECT_NEAR(fitted_exponent(points, "s"), 1.3, 1e-9);
 }
 
 TEST(JobChart, DrawsAPointAtZeroAndEscapesWords) {

@@ -55,7 +55,7 @@ struct Laboratory {
   Laboratory(const std::string& path, Route route, int frames, std::uint64_t seed = 1)
       : scene(path, {machine_memory_bytes()}), batches(scene.tin, scene.groups), tree(batches) {
     const GeoFrame::Placer placer(scene.frame);
-    for (const Waypoint& w : find_path(scene, route, frames, seed))
+    for (const Waypoint& w : find_path(flown(scene), route, frames, seed))
       plan.shots.push_back(shot_at(placer, w, {}));
   }
 

@@ -84,7 +84,7 @@ struct Walk {
   Walk(const std::string& path, Route route, int frames)
       : scene(path, {machine_memory_bytes()}), batches(scene.tin, scene.groups), tree(batches) {
     const GeoFrame::Placer placer(scene.frame);
-    for (const Waypoint& waypoint : find_path(scene, route, frames, kSeed))
+    for (const Waypoint& waypoint : find_path(flown(scene), route, frames, kSeed))
       shots.push_back(shot_at(placer, waypoint, kLens));
   }
 

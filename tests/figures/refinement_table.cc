@@ -98,7 +98,7 @@ struct Laboratory {
         refinement(scene.tin, scene.groups),
         cells("cells", hiding(), {walk_and_flight(scene.tin, least_m()).front()}) {
     const GeoFrame::Placer placer(scene.frame);
-    for (const Waypoint& waypoint : find_path(scene, route, frames, kSeed))
+    for (const Waypoint& waypoint : find_path(flown(scene), route, frames, kSeed))
       shots.push_back(shot_at(placer, waypoint, kLens));
   }
 
