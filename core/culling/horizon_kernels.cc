@@ -162,6 +162,7 @@ HWY_INLINE void raise_by(const SeenTriangles& seen, std::size_t t, HorizonBins& 
   const Vector up0 = value(seen.up0[t]), up01 = value(seen.up01[t]), up12 = value(seen.up12[t]);
   const Vector slope = value(seen.slope[t]), slope01 = value(seen.slope01[t]),
                slope12 = value(seen.slope12[t]);
+  const Vector top = value(seen.top[t]);
   const Vector margin = value(seen.margin[t]), farthest = value(seen.farthest_m[t]);
   const Vector left = value(bins.left), width = value(bins.width);
   const auto top_at = [&](Vector border) {
@@ -173,10 +174,12 @@ HWY_INLINE void raise_by(const SeenTriangles& seen, std::size_t t, HorizonBins& 
     return hn::Max(up0 + (across - x0) * slope, bent);
   };
   for (auto bin = static_cast<std::size_t>(seen.from[t]); bin < to; bin += lanes) {
+    const Mask asked = hn::FirstN(kDoubles, to - bin);
+    const Vector was = hn::LoadU(kDoubles, &bins.up[bin]);
+    if (hn::AllFalse(kDoubles, hn::And(asked, hn::Lt(was, top)))) continue;  // most of them
     const Vector border = hn::Iota(kDoubles, static_cast<double>(bin));
     const Vector up = hn::Min(top_at(border), top_at(border + value(1))) - margin;
-    const Vector was = hn::LoadU(kDoubles, &bins.up[bin]);
-    const Mask raises = hn::And(hn::FirstN(kDoubles, to - bin), hn::Gt(up, was));
+    const Mask raises = hn::And(asked, hn::Gt(up, was));
     const Vector was_m = hn::LoadU(kDoubles, &bins.farthest_m[bin]);
     hn::StoreU(hn::IfThenElse(raises, up, was), kDoubles, &bins.up[bin]);
     hn::StoreU(hn::IfThenElse(raises, farthest, was_m), kDoubles, &bins.farthest_m[bin]);

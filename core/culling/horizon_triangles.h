@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -29,9 +30,14 @@ class HorizonTriangles {
     const Place& place = places_[group];
     return {place.origin, place.is_wide ? nullptr : steps_.data() + 9 * place.first, place.count};
   }
-  /// Asks for a group's triangles while others are looked at: they are mostly out of every cache.
-  void prefetch(GroupIndex group) const {
-    const Group of_group = of(group);
+  /// How many triangles of a group are looked at before the others.
+  static constexpr std::size_t kProbed = 2 * kLaidOut;
+
+  /// Asks for a group's triangles, or those looked at first, while others are: they are mostly out
+  /// of every cache.
+  void prefetch(GroupIndex group, bool all) const {
+    Group of_group = of(group);
+    if (!all) of_group.count = std::min(of_group.count, kProbed);
     constexpr std::size_t kLine = 64 / sizeof(std::int32_t);
     for (std::size_t i = 0; i < 9 * of_group.count; i += kLine)
       __builtin_prefetch(of_group.steps + i);

@@ -214,13 +214,19 @@ bool RisingHorizon::shows_any(const SeenTriangles& seen) const {
 bool RisingHorizon::shows(const HorizonTriangles::Group& triangles, bool adds) {
   if (triangles.steps == nullptr) return true;
   const std::size_t parts = (triangles.count + kSetUp - 1) / kSetUp;
-  if (seen_.size() < parts) seen_.resize(parts);
+  if (seen_.size() < std::max<std::size_t>(1, parts)) seen_.resize(std::max<std::size_t>(1, parts));
   std::size_t ready = 0;
   const auto set_up_next = [&] {
     set_up(eye_, bins_, triangles.origin, triangles.steps + ready * 9 * kSetUp,
            std::min(kSetUp, triangles.count - ready * kSetUp), seen_[ready]);
     ++ready;
   };
+  if (!adds) {
+    // Of what is not added a few triangles mostly show that it may be seen.
+    set_up(eye_, bins_, triangles.origin, triangles.steps,
+           std::min(HorizonTriangles::kProbed, triangles.count), seen_[0]);
+    if (shows_any(seen_[0])) return true;
+  }
   bool shown = false;
   while (!shown && ready < parts) {
     set_up_next();

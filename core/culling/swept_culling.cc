@@ -33,14 +33,6 @@ SweptCulling::SweptCulling(const CertifiedRegions& regions, const GroupBatches& 
   }
 }
 
-/// Whether any of a group may be seen; what may be then hides what is behind it.
-bool SweptCulling::shows(GroupIndex group, double nearest_m) {
-  const Bounds& box = batches_.box(group);
-  if (horizon_.hides(box)) return false;
-  const double width_m = std::hypot(box.high.x_m - box.low.x_m, box.high.y_m - box.low.y_m);
-  return horizon_.shows(triangles_.of(group), width_m >= kLeastOccluderRad * nearest_m);
-}
-
 /// The groups of blocks that are in view and not under the horizon, by nearest point, without those
 /// that the regions hide.
 void SweptCulling::look_up(const Camera& camera, std::span<const NearBlock> blocks) {
@@ -53,7 +45,12 @@ void SweptCulling::look_up(const Camera& camera, std::span<const NearBlock> bloc
   left_.resize(asked_.size());
   left_.resize(certified_.visible_among(camera, asked_, left_));
   order_.clear();
-  for (const GroupIndex g : left_) order_.emplace_back(horizon_.nearest_m(batches_.box(g)), g);
+  for (const GroupIndex g : left_) {
+    const Bounds& box = batches_.box(g);
+    const double nearest_m = horizon_.nearest_m(box);
+    const double width_m = std::hypot(box.high.x_m - box.low.x_m, box.high.y_m - box.low.y_m);
+    order_.push_back({nearest_m, g, width_m >= kLeastOccluderRad * nearest_m});
+  }
   std::sort(order_.begin(), order_.end());
 }
 
@@ -69,10 +66,12 @@ std::size_t SweptCulling::visible_into(const Camera& camera, std::span<GroupInde
   for (std::size_t next = 0; next < near_.size(); next += kBlocksAtOnce) {
     look_up(camera, std::span(near_).subspan(next, std::min(kBlocksAtOnce, near_.size() - next)));
     for (std::size_t i = 0; i < order_.size(); ++i) {
-      if (i + 1 < order_.size()) triangles_.prefetch(order_[i + 1].second);
-      const auto& [nearest_m, group] = order_[i];
-      visible[shown] = group;
-      shown += shows(group, nearest_m);
+      if (i + 1 < order_.size()) triangles_.prefetch(order_[i + 1].group, order_[i + 1].raises);
+      const NearGroup& near = order_[i];
+      visible[shown] = near.group;
+      // What may be seen hides what is behind it.
+      shown += !horizon_.hides(batches_.box(near.group)) &&
+               horizon_.shows(triangles_.of(near.group), near.raises);
     }
   }
   std::sort(visible.begin(), visible.begin() + static_cast<std::ptrdiff_t>(shown));
@@ -80,9 +79,11 @@ std::size_t SweptCulling::visible_into(const Camera& camera, std::span<GroupInde
 }
 
 CullingAnswer SweptCulling::visible(const Camera& camera) {
+  // Few of so many are written.
+  visible_.resize(batches_.groups());
+  const auto count = static_cast<std::ptrdiff_t>(visible_into(camera, visible_));
   CullingAnswer answer;
-  answer.visible_groups.resize(batches_.groups());
-  answer.visible_groups.resize(visible_into(camera, answer.visible_groups));
+  answer.visible_groups.assign(visible_.begin(), visible_.begin() + count);
   answer.nodes_tested = batches_.groups();
   return answer;
 }

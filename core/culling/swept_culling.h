@@ -46,9 +46,17 @@ class SweptCulling : public CullingMethod {
     std::uint32_t first, count;  // of groups_
   };
   using NearBlock = std::pair<double, std::uint32_t>;  // nearest point, metres ahead
+  struct NearGroup {
+    double nearest_m;  // ahead
+    GroupIndex group;
+    bool raises;  // the horizon
+
+    friend bool operator<(const NearGroup& a, const NearGroup& b) {
+      return std::pair(a.nearest_m, a.group) < std::pair(b.nearest_m, b.group);
+    }
+  };
 
   void look_up(const Camera& camera, std::span<const NearBlock> blocks);
-  bool shows(GroupIndex group, double nearest_m);
 
   CertifiedCulling certified_;
   const GroupBatches& batches_;
@@ -56,10 +64,11 @@ class SweptCulling : public CullingMethod {
   std::vector<Block> blocks_;
   std::vector<GroupIndex> groups_;  // by block
   RisingHorizon horizon_;
-  bool is_swept_ = false;                             // whether the horizon is of the last camera
-  std::vector<NearBlock> near_;                       // in view, by nearest point
-  std::vector<GroupIndex> asked_, left_;              // of some blocks, and not hidden by regions
-  std::vector<std::pair<double, GroupIndex>> order_;  // of those, by nearest point
+  bool is_swept_ = false;                 // whether the horizon is of the last camera
+  std::vector<NearBlock> near_;           // in view, by nearest point
+  std::vector<GroupIndex> asked_, left_;  // of some blocks, and not hidden by regions
+  std::vector<NearGroup> order_;          // of those, by nearest point
+  std::vector<GroupIndex> visible_;       // [groups]
 };
 
 }  // namespace scarp
