@@ -229,6 +229,7 @@ TEST(CompareScale, HalvesTheSideDownFromTheWholeDemAndFitsTheLargestSizes) {
   std::ofstream(folder.path("wide.asc")) << hills(80, 50);
   ScaleQuestion question;
   question.files = {folder.path("wide.asc")};
+  question.limit_s = 3600;
   std::string why;
   const auto job = compare_scale(question, {}, why);
   ASSERT_TRUE(job) << why;
@@ -253,6 +254,7 @@ TEST(CompareScale, LeavesOutWhatWouldNotFit) {
   std::ofstream(folder.path("hills.asc")) << hills(80, 80);
   ScaleQuestion question;
   question.files = {folder.path("hills.asc")};
+  question.limit_s = 3600;
   question.memory_bytes = 500'000;  // 40 x 40 samples, not 80 x 80
   std::string why;
   const auto job = compare_scale(question, {}, why);
