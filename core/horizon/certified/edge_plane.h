@@ -36,7 +36,7 @@ struct SkyPlane {
 class EdgePlane {
  public:
   /// The edge's right side is the outer one, so that v rises from a to b.
-  EdgePlane(const FanView& view, const FanPlace& a, const FanPlace& b) : a_(a) {
+  EdgePlane(const FanView& view, const FanPlace& a, const FanPlace& b) : view_(view), a_(a) {
     const double du_m = b.u_m - a.u_m, dv_m = b.v_m - a.v_m;
     const double length_m = std::sqrt(du_m * du_m + dv_m * dv_m);
     eu_ = du_m / length_m, ev_ = dv_m / length_m;
@@ -79,9 +79,8 @@ class EdgePlane {
   bool is_held() const { return rise_ > -HUGE_VAL && rise_ < HUGE_VAL; }
 
   /// @param from, to  the part of the edge that a beam crosses
-  /// @param rays      of the beam
   /// Requires is_held().
-  SkyPlane plane(const FanPlace& from, const FanPlace& to, const FanPart& rays) const {
+  SkyPlane plane(const FanPlace& from, const FanPlace& to) const {
     const double steepness = std::abs(along_) + std::abs(rise_);
     SkyPlane plane{a_.u_m,
                    a_.v_m,
@@ -92,9 +91,7 @@ class EdgePlane {
                    steepness * 0x1p-44,
                    0,
                    0};
-    plane.line_slope = plane.ahead +
-                       std::min(plane.left * rays.low_turn, plane.left * rays.high_turn) -
-                       plane.slope_error;
+    plane.line_slope = plane.ahead - std::abs(plane.left) * view_.fan.tan_half - plane.slope_error;
     plane.line_m =
         std::min(from.z_m - plane.line_slope * from.u_m, to.z_m - plane.line_slope * to.u_m) -
         2 * plane.error_m;
@@ -102,6 +99,7 @@ class EdgePlane {
   }
 
  private:
+  const FanView& view_;
   const FanPlace a_;
   double eu_, ev_, along_, error_m_, height_error_m_;
   double rise_ = HUGE_VAL;  // outwards, square to the edge

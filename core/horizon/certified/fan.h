@@ -26,25 +26,6 @@ inline constexpr double kFanWidening = 0x1p-30;
 /// Requires 8 <= count <= 2^16, so that rounding stays under the widening.
 Fan fan_of(std::int32_t count, std::int32_t index);
 
-/// A part of a fan: the rays along which v grows by low_turn to high_turn for each metre of u, both
-/// included.
-struct FanPart {
-  double low_turn, high_turn;
-};
-inline FanPart whole_of(const Fan& fan) {
-  return {-fan.tan_half, fan.tan_half};
-}
-
-/// No less than the angle from the fan's middle, radians, of a ray of the fan by its turn: terms of
-/// the series, which are the same bits everywhere, other than a library's arctangent.
-inline double greatest_angle_rad(double turn) {
-  const double cube = turn * turn * turn;
-  return turn - cube / 3 + (turn > 0 ? cube * turn * turn / 5 : 0);
-}
-inline double least_angle_rad(double turn) {
-  return -greatest_angle_rad(-turn);
-}
-
 /// A place in a fan's frame; heights are not changed. Metres.
 struct FanPlace {
   double u_m, v_m, z_m;

@@ -126,4 +126,14 @@ std::size_t Ridges::strip_at(double v_m) const {
   return static_cast<std::size_t>(std::clamp(strip, 0.0, static_cast<double>(first_.size() - 2)));
 }
 
+std::span<const RidgeCrossing> Ridges::along(double v_m) const {
+  const std::size_t s = strip_at(v_m);
+  return {crossings_.data() + first_[s], first_[s + 1] - first_[s]};
+}
+
+std::span<const float> Ridges::highest_along(double v_m) const {
+  const std::size_t s = strip_at(v_m), count = first_[s + 1] - first_[s];
+  return {highest_.data() + first_highest(s), (count + kCrossingsAtOnce - 1) / kCrossingsAtOnce};
+}
+
 }  // namespace scarp

@@ -52,26 +52,13 @@ class Ridges {
   void cross(const RidgeEdges& ridges, const FanView& view, double width_m,
              const RidgeRange& range);
 
-  /// The strip that holds v, or the nearest one.
-  std::size_t strip_at(double v_m) const;
-  std::size_t strips() const { return first_.size() - 1; }
-  /// Where a strip begins.
-  double begin_of(std::size_t strip) const {
-    return low_v_m_ + (static_cast<double>(first_strip_) + static_cast<double>(strip)) * width_m_;
-  }
-
-  /// The crossings of a strip.
-  std::span<const RidgeCrossing> along(std::size_t strip) const {
-    return {crossings_.data() + first_[strip], first_[strip + 1] - first_[strip]};
-  }
+  /// The crossings of the strip that holds v. Requires v in the range.
+  std::span<const RidgeCrossing> along(double v_m) const;
   /// The greatest height of each kCrossingsAtOnce of them.
-  std::span<const float> highest_along(std::size_t strip) const {
-    const std::size_t count = first_[strip + 1] - first_[strip];
-    return {highest_.data() + first_highest(strip),
-            (count + kCrossingsAtOnce - 1) / kCrossingsAtOnce};
-  }
+  std::span<const float> highest_along(double v_m) const;
 
  private:
+  std::size_t strip_at(double v_m) const;
   /// Where a strip's greatest heights begin.
   std::size_t first_highest(std::size_t strip) const {
     return first_[strip] / kCrossingsAtOnce + strip;

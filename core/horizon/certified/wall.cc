@@ -114,8 +114,7 @@ void turn_rays(const FanView& view, const Beam& beam, const std::array<FanPlace,
 }
 
 /// The plane that an edge of the chain holds, with the better of two lines along rays.
-std::optional<SkyPlane> plane_over(const FanView& view, const FanPart& rays,
-                                   const std::array<FanPlace, 2>& edge,
+std::optional<SkyPlane> plane_over(const FanView& view, const std::array<FanPlace, 2>& edge,
                                    const std::array<FanPlace, 2>& part, const Places& targets) {
   EdgePlane through_edge(view, edge[0], edge[1]);
   CurtainPlane curtain(view, part[0], part[1]);
@@ -124,7 +123,7 @@ std::optional<SkyPlane> plane_over(const FanView& view, const FanPart& rays,
   curtain.hold_slope(least.curtain);
   if (!through_edge.is_held())
     return curtain.is_held() ? std::optional(curtain.plane()) : std::nullopt;
-  SkyPlane plane = through_edge.plane(part[0], part[1], rays);
+  SkyPlane plane = through_edge.plane(part[0], part[1]);
   if (!curtain.is_held()) return plane;
   const SkyPlane level = curtain.plane();
   if (level.line_slope > plane.line_slope)
@@ -148,7 +147,7 @@ bool raise_wall(const RidgeEdges& ridges, const FanView& view, const Beam& beam,
     const std::array<FanPlace, 2> ends{between(a, b, from), between(a, b, to)};
     for (const FanPlace& end : ends)
       if (!(beam.ahead.at(end) > 8 * view.error_m)) return false;
-    auto plane = plane_over(view, beam.rays, {a, b}, ends, targets);
+    auto plane = plane_over(view, {a, b}, ends, targets);
     if (!plane) return false;
     turn_rays(view, beam, ends, *plane);
     plane->beyond_m = std::max(ends[0].u_m, ends[1].u_m);

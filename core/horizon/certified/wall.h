@@ -31,12 +31,11 @@ inline FanPlace between(const FanPlace& p, const FanPlace& q, double share) {
           p.z_m + share * (q.z_m - p.z_m)};
 }
 
-/// Where rays of a part of a fan can be, beyond the line from `from` to `to` that they have come
-/// through: not negative in all three.
+/// Where rays of a fan can be, beyond the line from `from` to `to` that they have come through: not
+/// negative in all three.
 struct Beam {
   HalfPlane low, high, ahead;
   FanPlace from, to;
-  FanPart rays;
 };
 
 /// What a chain of edges across a beam hides: cameras beyond every edge (SkyPlane::beyond_m) and

@@ -18,9 +18,8 @@ namespace scarp {
 struct HidingOptions {
   std::int32_t fans = 192;     ///< of directions; a multiple of 8
   std::int32_t sectors = 248;  ///< of camera azimuths around a group
-  double piece = 1;      ///< greatest length of what is looked at by itself of a group's border, in
-                         ///< mean distances between the group's vertices
-  int fan_halvings = 1;  ///< of the directions over a piece, where something stays open
+  double piece = 1;  ///< greatest length of what is looked at by itself of a group's border, in
+                     ///< mean distances between the group's vertices
   double width =
       0.25;  ///< of strips in which ridges are looked for, in the mean unit of all groups
 };
@@ -50,8 +49,7 @@ struct HidingBounds {
 /// camera sees something of a group exactly where nothing beyond rises above its tangent to the
 /// hull of the group's slice.
 ///
-/// Work goes only where a camera over the ground, or near the data, can use a bound (ReachedCells),
-/// and closer where one stays open: to halves of a piece, then of its directions (GroupLook).
+/// Work goes only where a camera over the ground, or near the data, can use a bound (ReachedCells).
 ///
 /// Side: never more than is hidden. The same bits for any number of threads.
 /// Requires tin.neighbours, a group or kNone for each triangle, groups that have one.

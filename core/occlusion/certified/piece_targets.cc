@@ -10,14 +10,12 @@
 namespace scarp {
 namespace {
 
-/// The half-plane on one side of a ray over an end of a piece: over that end which leaves the whole
-/// piece in it.
-/// @param side  +1: to the left of the ray, -1: to the right
-HalfPlane beside_ray(const FanView& view, const ExitPiece& piece, double turn, int side) {
-  const double at_a_m = piece.a.v_m - turn * piece.a.u_m;
-  const double at_b_m = piece.b.v_m - turn * piece.b.u_m;
-  const double from_m = side > 0 ? std::min(at_a_m, at_b_m) : std::max(at_a_m, at_b_m);
-  return {4 * view.error_m - side * from_m, -side * turn, static_cast<double>(side)};
+/// The half-planes left of the line from one end of a piece that opens by the fan's half angle.
+/// @param way  +1: the region beyond the piece, -1: behind it
+HalfPlane opening_from(const FanView& view, const FanPlace& end, int side, int way) {
+  const double tan_half = view.fan.tan_half;
+  return {side * -end.v_m - way * end.u_m * tan_half + 4 * view.error_m, way * tan_half,
+          static_cast<double>(side)};
 }
 
 /// The region ahead of a border edge.
@@ -33,20 +31,26 @@ struct Wedge {
   HalfPlane low, high, behind;
 };
 
-/// Rays over a piece. Where they cross it both ways, before and behind the box around it.
+/// Rays over a piece. Where they cross it both ways, of the box around it.
 void open_piece(const FanView& view, const ExitPiece& piece, bool is_proper, Wedge& wedge,
                 Beam& beam) {
-  const auto [low_turn, high_turn] = piece.rays;
-  beam.low = beside_ray(view, piece, low_turn, 1);
-  beam.high = beside_ray(view, piece, high_turn, -1);
-  wedge.low = beside_ray(view, piece, high_turn, 1);
-  wedge.high = beside_ray(view, piece, low_turn, -1);
-  beam.from = piece.a, beam.to = piece.b, beam.rays = piece.rays;
+  const double low_v_m = std::min(piece.a.v_m, piece.b.v_m);
+  const double high_v_m = std::max(piece.a.v_m, piece.b.v_m);
+  const double low_u_m = std::min(piece.a.u_m, piece.b.u_m);
+  const double high_u_m = std::max(piece.a.u_m, piece.b.u_m);
+  beam.from = piece.a, beam.to = piece.b;
   if (is_proper) {
+    wedge.low = opening_from(view, piece.a, 1, -1);
+    wedge.high = opening_from(view, piece.b, -1, -1);
+    beam.low = opening_from(view, piece.a, 1, 1);
+    beam.high = opening_from(view, piece.b, -1, 1);
     beam.ahead = ahead_of(*piece.edge);
     wedge.behind = {-beam.ahead.c0, -beam.ahead.cu, -beam.ahead.cv};
   } else {
-    const double high_u_m = std::max(piece.a.u_m, piece.b.u_m);
+    wedge.low = opening_from(view, {high_u_m, low_v_m, 0}, 1, -1);
+    wedge.high = opening_from(view, {high_u_m, high_v_m, 0}, -1, -1);
+    beam.low = opening_from(view, {low_u_m, low_v_m, 0}, 1, 1);
+    beam.high = opening_from(view, {low_u_m, high_v_m, 0}, -1, 1);
     beam.ahead = {-high_u_m, 1, 0};
     wedge.behind = {high_u_m + 4 * view.error_m, -1, 0};
   }
@@ -167,7 +171,7 @@ void FanCrests::place_corners(const FanView& view, std::span<const VertexIndex> 
 void find_targets(const FanView& view, const ExitPiece& piece, const FanCrests& crests,
                   std::span<const std::uint32_t> candidates, PieceTargets& targets) {
   const FanEdge& border = *piece.edge;
-  const bool is_proper = is_exit(view, piece.rays, border);
+  const bool is_proper = is_exit(view, border);
   Wedge wedge;
   open_piece(view, piece, is_proper, wedge, targets.beam);
   std::vector<double>&low = targets.within_low, &high = targets.within_high,
@@ -197,7 +201,7 @@ void find_targets(const FanView& view, const ExitPiece& piece, const FanCrests& 
   targets.plane.reset();
   if (is_proper)
     if (const EdgePlane& plane = list.plane(); plane.is_held())
-      targets.plane = plane.plane(piece.a, piece.b, piece.rays);
+      targets.plane = plane.plane(piece.a, piece.b);
   targets.places.complete(2 * view.height_error_m);
 }
 

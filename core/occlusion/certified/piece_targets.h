@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -34,24 +33,23 @@ struct FanEdge {
   std::uint32_t from, to;  ///< corners, as in FanCrests
 };
 
-/// A part of a border edge of a group, over which rays of a part of a fan leave the group; directed
-/// like the edge, with the group on the left. v rises from a to b but for edges along the rays.
+/// A part of a border edge of a group, over which rays of a fan leave the group; directed like the
+/// edge, with the group on the left. v rises from a to b but for edges along the fan.
 struct ExitPiece {
   FanPlace a, b;
   const FanEdge* edge;
-  FanPart rays;
 };
 
-/// Whether every one of the rays that meets the edge's line crosses it from left to right.
-inline bool is_exit(const FanView& view, const FanPart& rays, const FanEdge& edge) {
+/// Whether every ray of the fan that meets the edge's line crosses it from left to right.
+inline bool is_exit(const FanView& view, const FanEdge& edge) {
   const double du_m = edge.b.u_m - edge.a.u_m, dv_m = edge.b.v_m - edge.a.v_m;
-  return dv_m - std::max(du_m * rays.low_turn, du_m * rays.high_turn) > 8 * view.error_m;
+  return dv_m - (du_m < 0 ? -du_m : du_m) * view.fan.tan_half > 8 * view.error_m;
 }
 
-/// Whether none of them does.
-inline bool is_entry(const FanView& view, const FanPart& rays, const FanEdge& edge) {
+/// Whether no ray of the fan does.
+inline bool is_entry(const FanView& view, const FanEdge& edge) {
   const double du_m = edge.b.u_m - edge.a.u_m, dv_m = edge.b.v_m - edge.a.v_m;
-  return dv_m - std::min(du_m * rays.low_turn, du_m * rays.high_turn) < -8 * view.error_m;
+  return dv_m + (du_m < 0 ? -du_m : du_m) * view.fan.tan_half < -8 * view.error_m;
 }
 
 /// All that rays over a piece can come from, and where they go.
@@ -71,7 +69,7 @@ struct PieceTargets {
   Places under_plane;  // those that the plane holds, not rounded
 };
 
-/// Finds the ground of a group from which rays of the piece can reach it: the wedge behind it.
+/// Finds the ground of a group from which rays of the fan can reach a piece: the wedge behind it.
 /// A camera strictly under the plane through the border edge that has all of this ground under it
 /// sees none of it over the piece (EdgePlane).
 ///

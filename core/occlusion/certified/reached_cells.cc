@@ -265,15 +265,13 @@ void ReachedCells::reach(const RingTable& rings, const Turns& turns,
   open_end_ = wanted;
 }
 
-void ReachedCells::reach_part(const ReachedCells& whole, std::size_t low, std::size_t high,
-                              const FanPart& rays) {
+void ReachedCells::reach_part(const ReachedCells& whole, std::size_t low, std::size_t high) {
   make_room(whole.size());
   rings_ = whole.rings_, turns_ = whole.turns_, low_ = low, high_ = high;
   sectors_ = whole.sectors_, hints_ = whole.hints_, ring_best_ = whole.ring_best_;
   has_runs_ = false;
   const std::array<InRing, kRings> in = in_rings();
-  const float least_rad = static_cast<float>(least_angle_rad(rays.low_turn)) - kAngleRounding;
-  const float most_rad = static_cast<float>(greatest_angle_rad(rays.high_turn)) + kAngleRounding;
+  const auto half_rad = static_cast<float>(turns_->half_rad) + kAngleRounding;
   // Without branches: which cells are left follows no pattern.
   std::array<std::uint32_t, kRings> in_ring{};
   std::size_t size = 0;
@@ -283,8 +281,8 @@ void ReachedCells::reach_part(const ReachedCells& whole, std::size_t low, std::s
     const float low_rad = whole.low_border_rad_[i] - in[k].most_rad;
     const float high_rad = whole.high_border_rad_[i] - in[k].least_rad;
     low_rad_[size] = low_rad, high_rad_[size] = high_rad;
-    const unsigned is_taken = static_cast<unsigned>(low_rad <= most_rad) &
-                              static_cast<unsigned>(high_rad >= least_rad) &
+    const unsigned is_taken = static_cast<unsigned>(low_rad <= half_rad) &
+                              static_cast<unsigned>(high_rad >= -half_rad) &
                               static_cast<unsigned>(whole.best_[i] < whole.wanted_[i]);
     size += is_taken;
     in_ring[k] += is_taken;

@@ -89,9 +89,8 @@ class ReachedCells {
   void reach(const RingTable& rings, const Turns& turns, std::span<const SectorBorders> borders,
              std::size_t low, std::size_t high, const Known& known);
 
-  /// Those of a piece's cells that are open, as far as some of the rays over it lead to them.
-  void reach_part(const ReachedCells& whole, std::size_t low, std::size_t high,
-                  const FanPart& rays);
+  /// Those of a piece's cells that are open, as far as rays over a part of it lead to them.
+  void reach_part(const ReachedCells& whole, std::size_t low, std::size_t high);
 
   /// Raises what is known of each cell to the lowest of those planes that rays over the piece come
   /// through to it, of all planes in cells of no use; where cameras are not beyond one of them,

@@ -47,8 +47,7 @@ TEST(Places, AnswerForEachOfThemBitForBit) {
     }
     EXPECT_EQ(together.is_held(), apart.is_held()) << "seed " << seed;
     if (apart.is_held()) {
-      const FanPart rays = whole_of(view.fan);
-      EXPECT_EQ(together.plane(a, b, rays).ahead, apart.plane(a, b, rays).ahead);
+      EXPECT_EQ(together.plane(a, b).ahead, apart.plane(a, b).ahead);
     }
     const Places::Rises rises = places.least_rises(together.line(), curtain.line());
     EXPECT_EQ(rises.edge, places.least_rise(together.line()));

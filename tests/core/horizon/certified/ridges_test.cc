@@ -35,7 +35,7 @@ TEST(Ridges, ARangeHoldsWhatIsAheadOfItAndNothingElseChanges) {
       const double v_m = range.low_v_m + k / 40.0 * (range.high_v_m - range.low_v_m);
       const auto ahead = [&](const Ridges& ridges) {
         std::vector<std::uint32_t> found;
-        for (const RidgeCrossing& c : ridges.along(ridges.strip_at(v_m)))
+        for (const RidgeCrossing& c : ridges.along(v_m))
           if (static_cast<double>(c.u_m) >= range.low_u_m) found.push_back(c.edge);
         return found;
       };
@@ -56,13 +56,13 @@ TEST(Ridges, TellTheHighestOfCrossingsThatAreTakenAtOnce) {
     view_along(fan_of(8, i), tin, 140, 120, view);
     ridges.cross(edges, view, 7, kAll);
     for (double v_m = view.low_v_m; v_m < view.high_v_m; v_m += 3) {
-      const auto crossings = ridges.along(ridges.strip_at(v_m));
+      const auto crossings = ridges.along(v_m);
       std::vector<float> highest;
       for (std::size_t at = 0; at < crossings.size(); ++at) {
         if (at % kCrossingsAtOnce == 0) highest.push_back(crossings[at].z_m);
         highest.back() = std::max(highest.back(), crossings[at].z_m);
       }
-      const auto told = ridges.highest_along(ridges.strip_at(v_m));
+      const auto told = ridges.highest_along(v_m);
       EXPECT_EQ(std::vector<float>(told.begin(), told.end()), highest) << v_m;
       most = std::max(most, highest.size());
     }

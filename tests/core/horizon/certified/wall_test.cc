@@ -53,12 +53,6 @@ struct Scene {
         fan_of(fans, static_cast<std::int32_t>(random.below(static_cast<std::uint64_t>(fans)))),
         tin, 40, 110 * random.unit(), view);
     const double way_m = 5 + 20 * random.unit(), tan_half = view.fan.tan_half;
-    FanPart rays = whole_of(view.fan);
-    if (random.below(2) == 0) {
-      const double turns[] = {tan_half * (2 * random.unit() - 1),
-                              tan_half * (2 * random.unit() - 1)};
-      rays = {std::min(turns[0], turns[1]), std::max(turns[0], turns[1])};
-    }
     low = {0, 10 * random.unit() - 10, 0}, high = {0, 10 * random.unit(), 0};
     // As far aslant as all rays still cross it one way.
     if (random.below(2) == 0)
@@ -69,12 +63,11 @@ struct Scene {
                {high.u_m - way_m, high.v_m + way_m * tan_half, 30 * random.unit()}};
     const double length_m = std::hypot(high.u_m - low.u_m, high.v_m - low.v_m);
     const double nu = (high.v_m - low.v_m) / length_m, nv = -(high.u_m - low.u_m) / length_m;
-    beam = {{-low.v_m + low.u_m * rays.low_turn, -rays.low_turn, 1},
-            {high.v_m - high.u_m * rays.high_turn, rays.high_turn, -1},
+    beam = {{-low.v_m - low.u_m * tan_half, tan_half, 1},
+            {high.v_m - high.u_m * tan_half, tan_half, -1},
             {-nu * low.u_m - nv * low.v_m, nu, nv},
             low,
-            high,
-            rays};
+            high};
   }
 
   /// A place between the targets, and one on the piece that a ray from it can cross.
@@ -84,8 +77,7 @@ struct Scene {
     const FanPlace from = between(far, near, 0.99 * random.unit());
     // The ends of the piece and of the fan are where something may be missed.
     double share = random.unit();
-    const auto [low_turn, high_turn] = beam.rays;
-    const double turn = random.below(2) ? low_turn : high_turn;
+    const double turn = (1 - 1e-9) * view.fan.tan_half * (random.below(2) ? 1 : -1);
     switch (random.below(4)) {
       case 0:
         share = random.below(2) ? 0 : 1;
@@ -93,15 +85,15 @@ struct Scene {
       case 1: {
         const double at_low = low.v_m - from.v_m - turn * (low.u_m - from.u_m);
         const double at_high = high.v_m - from.v_m - turn * (high.u_m - from.u_m);
-        share = std::clamp(at_low / (at_low - at_high), 1e-9, 1 - 1e-9);
+        share = std::clamp(at_low / (at_low - at_high), 0.0, 1.0);
         break;
       }
       default:
         break;
     }
     const FanPlace over = between(low, high, share);
-    if (!(over.u_m > from.u_m) || over.v_m - from.v_m < (low_turn - 1e-9) * (over.u_m - from.u_m) ||
-        over.v_m - from.v_m > (high_turn + 1e-9) * (over.u_m - from.u_m))
+    if (!(over.u_m > from.u_m) ||
+        std::abs(over.v_m - from.v_m) > view.fan.tan_half * (over.u_m - from.u_m))
       return {};
     return std::array{from, over};
   }

@@ -38,8 +38,6 @@ class Cells {
         borders_(borders_of(layout_)),
         bounds_(static_cast<std::size_t>(sectors) * kRings, std::numeric_limits<float>::infinity()),
         least_(bounds_.size() + kHintsBeyond, slope_hint(-1e30F)),
-        useless_(bounds_.size(), 8),
-        above_(bounds_.size() + kHintsBeyond, slope_hint(9)),
         wanted_(bounds_.size() / kCellsMarked) {
     turns_.turn_to(layout_, fan_, rings_);
   }
@@ -52,22 +50,16 @@ class Cells {
   }
 
   /// What is known of a camera's cell after planes were raised over a piece that the ray crosses.
-  /// @param as_part   as of a half of a piece, and of the rays about this one
-  /// @param is_of_use  whether more is wanted to be known
-  float bound_at(const Ray& ray, const std::vector<CellPlane>& planes, bool as_part,
-                 bool is_of_use = true) {
-    const std::vector<float>& known_bounds = is_of_use ? bounds_ : useless_;
-    const ReachedCells::Known known{known_bounds.data(), (is_of_use ? least_ : above_).data(),
-                                    wanted_.data()};
+  float bound_at(const Ray& ray, const std::vector<CellPlane>& planes, bool as_part) {
+    const ReachedCells::Known known{bounds_.data(), least_.data(), wanted_.data()};
     const auto lane = static_cast<std::size_t>((ray.offset + 1) * (kLanes / 2));
     ReachedCells whole, part;
     whole.mark(turns_, layout_.sectors, known, wanted_.data());
     whole.reach(rings_, turns_, borders_, as_part ? 0 : lane, as_part ? kLanes - 1 : lane, known);
-    const double turn = std::tan(ray.turn_rad);
-    if (as_part) part.reach_part(whole, lane, lane, {turn, turn});
+    if (as_part) part.reach_part(whole, lane, lane);
     ReachedCells& cells = as_part ? part : whole;
     cells.raise(planes);
-    std::vector<float> bounds = known_bounds;
+    std::vector<float> bounds = bounds_;
     cells.lower(bounds.data());
     const double azimuth_rad = fan_.middle_rad + ray.azimuth_rad();
     const auto sector = sector_of(layout_, std::cos(azimuth_rad), std::sin(azimuth_rad));
@@ -82,8 +74,6 @@ class Cells {
   std::vector<SectorBorders> borders_;
   std::vector<float> bounds_;
   std::vector<std::uint16_t> least_;
-  std::vector<float> useless_;
-  std::vector<std::uint16_t> above_;
   std::vector<std::uint64_t> wanted_;
 };
 
@@ -132,34 +122,9 @@ TEST(ReachedCells, APlaneHidesNothingFromCamerasThatAreNotBeyondIt) {
     mine.first_ring = static_cast<std::size_t>(cells.ring_at(ray)) + 1;
     const std::vector<CellPlane> planes =
         random.below(2) ? std::vector{mine, other} : std::vector{mine};
-    for (const bool is_of_use : {false, true})
-      EXPECT_EQ(cells.bound_at(ray, planes, random.below(2), is_of_use),
-                -std::numeric_limits<float>::infinity());
+    EXPECT_EQ(cells.bound_at(ray, planes, random.below(2)),
+              -std::numeric_limits<float>::infinity());
   });
-}
-
-TEST(ReachedCells, RaysOfAnotherPartOfAFanDoNotReachACell) {
-  PolarLayout layout{512, 2};
-  const Fan fan = fan_of(8, 3);
-  const RingTable rings(layout, fan);
-  Turns turns;
-  turns.turn_to(layout, fan, rings);
-  const auto borders = borders_of(layout);
-  std::vector<float> bounds(512 * kRings, std::numeric_limits<float>::infinity());
-  const std::vector<std::uint16_t> least(bounds.size() + kHintsBeyond, slope_hint(-1e30F));
-  std::vector<std::uint64_t> wanted(bounds.size() / kCellsMarked);
-  const ReachedCells::Known known{bounds.data(), least.data(), wanted.data()};
-  ReachedCells whole, part;
-  whole.mark(turns, layout.sectors, known, wanted.data());
-  whole.reach(rings, turns, borders, kLanes / 2, kLanes / 2, known);
-  part.reach_part(whole, kLanes / 2, kLanes / 2, {-fan.tan_half, -0.9 * fan.tan_half});
-  part.raise(std::vector{flat_plane(-5)});
-  part.lower_closed(bounds.data());
-  part.lower(bounds.data());
-  const auto is_lowered = [](float bound) { return bound == -5; };
-  const auto lowered = std::count_if(bounds.begin(), bounds.end(), is_lowered);
-  EXPECT_GT(lowered, kRings);
-  EXPECT_LT(lowered, 10 * kRings);
 }
 
 }  // namespace
