@@ -58,8 +58,9 @@ TEST_F(FlyCommand, MethodsThatClaimItShowNoWrongPixelAndLeaveSomethingOut) {
       const std::string name = method["method"];
       methods.insert(name);
       if (name == "frustum") all = method["drawn"];
-      // The estimate of depths of hom is too coarse for so few hills.
-      if (name != "frustum" && name != "hom") {
+      // So few hills are less than the estimate of depths of hom and the margin of masks want.
+      const bool is_coarse = name == "hom" || name.starts_with("mask");
+      if (name != "frustum" && !is_coarse) {
         EXPECT_LT(method["drawn"], all) << name;
       }
       if (!method["claims_no_wrong_pixel"].get<bool>()) continue;
