@@ -9,9 +9,11 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "cli/build/certified_settings.h"
 #include "cli/build/options_json.h"
 #include "cli/build/report.h"
 #include "core/error/error.h"
+#include "core/occlusion/certified/certified_regions.h"
 #include "core/occlusion/certified/hiding_bounds.h"
 #include "ingest/dem/dem_windows.h"
 #include "tiles/store/checksum.h"
@@ -33,7 +35,8 @@ constexpr double kTriangleShare = 0.1;  // triangles to a sample
 /// fifth of the samples is in the mesh.
 constexpr double kVertexShare = 0.2;
 constexpr double kBytesPerSeenVertex = 250;
-constexpr double kBytesPerGroupSample = 24;  // index, raster of groups, bounds
+constexpr double kBytesPerGroupSample = 24;   // index, raster of groups
+constexpr double kBytesPerBoundSector = 384;  // of a group, while it is certified
 constexpr double kBytesPerDrawnTriangle = 150;
 constexpr std::uint64_t kBytesOfPictures = 64U << 20;
 constexpr std::uint64_t kBytesOfProcess = 96U << 20;
@@ -180,9 +183,18 @@ class Planner {
   }
   std::uint64_t groups_bytes(const TileId& tile) const {
     const double seen = static_cast<double>(scheme_.seen_from(tile).size());
+    const double groups = 2 * kVertexShare * samples_of(tile) / plan_.options.group_triangles;
     return kBytesOfProcess + static_cast<std::uint64_t>(
                                  samples_of(tile) * (kBytesPerGroupSample +
-                                                     kBytesPerSeenVertex * kVertexShare * seen));
+                                                     kBytesPerSeenVertex * kVertexShare * seen) +
+                                 groups * kBytesPerBoundSector * certified_sectors());
+  }
+  /// 0 where nothing is certified.
+  std::int32_t certified_sectors() const {
+    if (!has_certified(plan_.options.horizon)) return 0;
+    const auto triangles = static_cast<std::size_t>(plan_.options.group_triangles);
+    return plan_.options.sectors ? *plan_.options.sectors
+                                 : sectors_within(kCertifiedBytes, triangles, 1);
   }
   /// Pictures, or the tiles that are judged or looked over at once.
   std::uint64_t finish_bytes() const {
